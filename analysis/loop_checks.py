@@ -19,6 +19,7 @@ from nlctl.errors import DivergedError, InexactWarning, UsageError
 from nlctl.native.describe import called
 from nlctl.response import input_output_response
 from nlctl.sampling.system import clocks_of
+from nlctl.upstream.systems import System
 from nlctl.wording import counted, some_of
 
 from .lyapunov.ledger import Ledger, ledger
@@ -45,7 +46,7 @@ class LoopCheck:
     status: str
 
 
-def checks_of(loop: Any, response: Any, params: Mapping[str, Any]) -> list[LoopCheck]:
+def checks_of(loop: object, response: object, params: Mapping[str, Any]) -> list[LoopCheck]:
     """Return what is checked of a loop and one run of it; a check that has no meaning says why."""
     answers = {what: answer(loop, response, dict(params)) for what, answer in _CHECKS.items()}
     return [
@@ -103,7 +104,10 @@ def checks_section(checks: Sequence[LoopCheck]) -> Section:
 
 
 def proof_of(
-    loop: Any, horizon: float, start: Mapping[str, float], params: Mapping[str, Any]
+    loop: ct.InterconnectedSystem,
+    horizon: float,
+    start: Mapping[str, float],
+    params: Mapping[str, Any],
 ) -> Ledger | LoopCheck:
     """Return the paper's proof line by line for a loop of its kind, else why it does not apply."""
     try:
@@ -116,7 +120,7 @@ def proof_of(
 _Answer = tuple[str, str]  # what was found, and its status
 
 
-def _engine(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
+def _engine(loop: System, response: Any, params: dict[str, Any]) -> _Answer:
     """Return who has computed the run."""
     run = response.statistics
     if run is None:
@@ -125,7 +129,7 @@ def _engine(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
     return f"machine code was compared with them along the run, which took {steps}", "pass"
 
 
-def _switching(loop: Any, response: Any, params: dict[str, Any]) -> _Answer | None:
+def _switching(loop: System, response: Any, params: dict[str, Any]) -> _Answer | None:
     """Return what is known of the conditions of a run, unless python-control ran it."""
     if response.statistics is None:
         return None

@@ -74,7 +74,7 @@ def _steady(system: ct.InputOutputSystem, content: Mapping[str, _T]) -> dict[str
     return {GIVEN.sub(lambda m: numbers.get(m[0], m[0]), k): v for k, v in content.items()}
 
 
-def short_key(*things: Any) -> str:
+def short_key(*things: object) -> str:
     """Return a key of functions, and of all that they reach, short enough to be read."""
     return content_key(*things)[:16]
 
@@ -144,7 +144,7 @@ def value_text(value: object) -> str:
         return short_key(value)
 
 
-def array_text(values: Any) -> str:
+def array_text(values: object) -> str:
     """Return a text that differs where arrays of numbers differ."""
     array = np.asarray(values, dtype="<f8")
     return f"{hashlib.sha256(array.tobytes()).hexdigest()[:16]} of shape {array.shape}"

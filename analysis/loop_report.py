@@ -99,24 +99,24 @@ def loop_report(
     blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
     sentences = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = diagram_sections(loop, ("loop", "loop-equations"))
-    given, kept = {}, None
+    overrides, histories = {}, None
     if response is not None:
-        given = own_parameters(loop, response) if params is None else dict(params)
-        check_response(loop, response, given)
-        parts.append(run_section(loop, response, signals, given))
-    moved = _moved(loop, response, given, live)
+        overrides = own_parameters(loop, response) if params is None else dict(params)
+        check_response(loop, response, overrides)
+        parts.append(run_section(loop, response, signals, overrides))
+    moved = _moved(loop, response, overrides, live)
     parts += sections
     _proved(loop, ledger, certificate, sentences, parts)
     if study is not None:
         _check_study(loop, study)
         sentences.append(without_assumptions(study.verdict))
-        of_study, kept, lost = _runs_again(study)
+        of_study, histories, lost = _runs_again(study)
         requirements = (*requirements, *of_study)
-        parts += _study_parts(study, kept, lost)
+        parts += _study_parts(study, histories, lost)
     if moved is not None:
         item = live_item(
             moved, response, () if isinstance(live, bool) else live, signals=signals,
-            requirements=requirements, histories=kept, command=repeat, base=given,
+            requirements=requirements, histories=histories, command=repeat, base=overrides,
         )  # fmt: skip
         parts = [behind_figures(part, item) if part.key == "run" else part for part in parts]
     described, sources = ([], []) if study is None else methods(study)

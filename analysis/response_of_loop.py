@@ -36,7 +36,10 @@ def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
 
 
 def check_response(
-    loop: Any, response: Any, params: Mapping[str, Any] | None = None, names: Sequence[str] = ()
+    loop: Any,
+    response: Any,
+    params: Mapping[str, Any] | None = None,
+    names: Sequence[str] = (),
 ) -> None:
     """Refuse a response that is not one of a loop."""
     # At twelve samples the outputs must be those that the loop has at the response's states. Over
@@ -72,7 +75,7 @@ def own_outputs(
         yield int(place), dict(zip(loop.output_labels, y.tolist(), strict=True))
 
 
-def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
+def check_shape(loop: ct.InterconnectedSystem, response: Any, names: Sequence[str]) -> None:
     """Refuse a response with another number of states, other outputs, or several traces."""
     if response.x is None or np.ndim(response.y) != 2:
         raise DiagramError(
@@ -90,7 +93,11 @@ def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
 
 
 def _check_outputs(
-    loop: Any, response: Any, place: int, outputs: Mapping[str, float], names: Sequence[str]
+    loop: ct.InterconnectedSystem,
+    response: Any,
+    place: int,
+    outputs: Mapping[str, float],
+    names: Sequence[str],
 ) -> None:
     """Refuse outputs at one sample that are not the loop's at the same states."""
     for name in names or loop.output_labels:
@@ -137,7 +144,12 @@ def _engines(loop: Any) -> tuple[str, ...]:
 
 
 def _again(
-    loop: Any, response: Any, span: slice, params: Mapping[str, Any], engine: str, names: list[str]
+    loop: Any,
+    response: Any,
+    span: slice,
+    params: Mapping[str, Any],
+    engine: str,
+    names: list[str],
 ) -> np.ndarray:
     """Return states, and named outputs, of a loop over some samples; NaN where it does not come."""
     u, steps = _inputs(loop, response)[:, span], count()

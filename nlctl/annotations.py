@@ -72,8 +72,8 @@ def reporting(
         except (UsageError, DivergedError):
             raise
         except Exception as error:
-            if isinstance(error, TypeError) and (unknown_one := _misspelt(function, who, kwargs)):
-                raise unknown_one from None
+            if isinstance(error, TypeError) and (refusal := _refusal(function, who, args, kwargs)):
+                raise refusal from None
             if _says_it(error) or (rest := _complaint(function, who, args, kwargs, rule)) is None:
                 raise
             raise ParameterError(rest) from error
@@ -101,9 +101,16 @@ def _says_it(error: Exception) -> bool:
     return ours and (last.line or "").startswith("raise ")
 
 
-def _misspelt(function: Any, who: str, kwargs: Mapping[str, Any]) -> Exception | None:
-    """Return the error for an argument that a function does not have, if there is one."""
+def _refusal(
+    function: Any, who: str, args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> Exception | None:
+    """Return the error for an argument that a function does not take so, if there is one."""
     parameters = inspect.signature(function).parameters
+    by_name = [name for name, one in parameters.items() if one.kind is one.KEYWORD_ONLY]
+    if by_name and len(args) > 1 and set(parameters) - set(by_name) == {"self"}:
+        return UnknownKeywordError(
+            f"{who} takes its fields by name: {who}({', '.join(f'{name}=...' for name in by_name)})"
+        )
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
         return None
     known = [name for name in parameters if name != "self"]
@@ -177,7 +184,7 @@ def _imported_for_types(module: str) -> dict[str, Any]:
     return names
 
 
-def _fits(value: object, rule: Any, strict: bool) -> bool:
+def _fits(value: object, rule: object, strict: bool) -> bool:
     """Whether a value is what an annotation says; strictly, also what libraries can use."""
     origin, parts = typing.get_origin(rule), typing.get_args(rule)
     if rule is npt.ArrayLike or rule is np.ndarray or origin is np.ndarray:
@@ -201,13 +208,13 @@ def _fits(value: object, rule: Any, strict: bool) -> bool:
     return _is_one(value, origin or rule, strict)
 
 
-def _is_mapping(rule: Any) -> bool:
+def _is_mapping(rule: object) -> bool:
     kind = typing.get_origin(rule) or rule
     return isinstance(kind, type) and issubclass(kind, Mapping) and kind.__module__ in (
         "collections.abc", "builtins")  # fmt: skip
 
 
-def _is_one(value: Any, kind: Any, strict: bool) -> bool:
+def _is_one(value: Any, kind: object, strict: bool) -> bool:
     """Whether a value is a number, a text, or an object of a class."""
     if kind is Any:
         return True
@@ -263,7 +270,7 @@ def _is_many(value: Any, parts: Any, strict: bool) -> bool:
     return not parts or all(_fits(one, parts[0], strict) for one in value)
 
 
-def _words(rule: Any) -> str:
+def _words(rule: object) -> str:
     """Return an annotation in words."""
     origin, parts = typing.get_origin(rule), typing.get_args(rule)
     if rule is npt.ArrayLike or rule is np.ndarray or origin is np.ndarray:
@@ -275,7 +282,8 @@ def _words(rule: Any) -> str:
     if origin is tuple:
         return f"a tuple of {_words(parts[0])}" if parts else "a tuple"
     if _is_mapping(rule):
-        return "a mapping" + (f" of {_words(parts[0])} to {_words(parts[1])}" if parts else "")
+        values = "" if parts[1:] in ((), (Any,), (object,)) else f" to {_words(parts[1])}"
+        return "a mapping" + (f" of {_words(parts[0])}{values}" if parts else "")
     if rule in _MANY or origin in _MANY:
         return f"a list of {_words(parts[0])}" if parts else "a list"
     if rule is collections.abc.Callable or origin is collections.abc.Callable:

@@ -81,7 +81,7 @@ def _rule(name: str, low: tuple[float, float], high: tuple[float, float]) -> str
     return f"{lows[0]}{name}{highs[0]}" if lows else f"a finite {name}{''.join(highs)}"
 
 
-def tolerances(who: str, rtol: Any, atol: Any) -> None:
+def tolerances(who: str, rtol: object, atol: object) -> None:
     """Check the tolerances of an integrator: with rtol >= 1 no digit of a state need be right."""
     number(who, "rtol", rtol, above=0, below=1)
     number(who, "atol", atol, above=0)
@@ -121,7 +121,7 @@ def of_type(who: str, name: str, value: object, kind: type[_T], how: str = "") -
     return value
 
 
-def tuple_of(who: str, name: str, values: Any, kind: type[_T]) -> tuple[_T, ...]:
+def tuple_of(who: str, name: str, values: object, kind: type[_T]) -> tuple[_T, ...]:
     """Return a sequence of values of one kind as a tuple."""
     if not isinstance(values, list | tuple):
         raise ParameterError(

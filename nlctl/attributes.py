@@ -60,7 +60,7 @@ def with_returned(function: Any) -> str | None:
     return _with_section(text, section, after_parameters=True)
 
 
-def with_parameters_of(other: Any) -> Callable[[_F], _F]:
+def with_parameters_of(other: object) -> Callable[[_F], _F]:
     """Return a decorator: parameters that a docstring does not describe are as another one has."""
     # `other` is a function, or a docstring.
 

@@ -128,7 +128,7 @@ class Block(OwnParameters):
     See `block`.
     """
 
-    def __init__(self, spec: Any, name: str, **kwargs: Any) -> None:
+    def __init__(self, spec: Any, name: str, **kwargs: object) -> None:
         self.spec, self.current_spec = spec, None
         super().__init__(
             spec.update if spec.states else None,
@@ -153,7 +153,7 @@ class Block(OwnParameters):
             self.spec = self._resolved(values)
             set_parameters(self, None)
 
-    def __call__(self, u: Any, params: Any = None, squeeze: Any = None) -> Any:
+    def __call__(self, u: Any, params: object = None, squeeze: object = None) -> Any:
         """Return what a block without states makes of its inputs; a number is its one input."""
         return super().__call__(np.atleast_1d(u), params=params, squeeze=squeeze)
 
@@ -184,7 +184,7 @@ class Block(OwnParameters):
             )
         return complex(describing_function(self, A))
 
-    def _answer(self, t: float, x: Any, u: Any) -> Any:
+    def _answer(self, t: float, x: np.ndarray, u: np.ndarray) -> Any:
         """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now."""
         supplied = supplied_of(self)
         if supplied is None:
@@ -327,7 +327,7 @@ def block(
     return system
 
 
-def _check_has_equations(spec: Any) -> None:
+def _check_has_equations(spec: object) -> None:
     """Refuse what lacks signals or an equation; all that is missing is named."""
     if isinstance(spec, type):
         raise BlockError(f"{spec.__name__} is a class: make a record of it first")
@@ -345,7 +345,7 @@ def _check_has_equations(spec: Any) -> None:
         raise BlockError(f"{type(spec).__name__} is not a block: it lacks {', '.join(missing)}")
 
 
-def _check_timebase(spec: Any, name: str, dt: Any) -> None:
+def _check_timebase(spec: Any, name: str, dt: object) -> None:
     """Refuse x' for x[k+1], and the other way round."""
     who = f"{type(spec).__name__} (block '{name}')"
     is_number = isinstance(dt, int | float | np.number)
@@ -398,7 +398,7 @@ def sampling_of(system: System) -> Any:
     return system.sampling if isinstance(system, Around) else None
 
 
-def memory_states(spec: Any) -> tuple[str, ...]:
+def memory_states(spec: object) -> tuple[str, ...]:
     """Return the names of a record's memory states."""
     return tuple(getattr(spec, "memory", ())) if hasattr(spec, "commit") else ()
 
@@ -413,7 +413,7 @@ def guard_count(system: Block) -> int:
     return _count(system, "guard")
 
 
-def equation_now(system: Any, what: str, t: float, x: Any, u: Any) -> np.ndarray:
+def equation_now(system: Block, what: str, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return what an equation of a block says, of shape (k,), with the parameters it has now."""
     values = getattr(system.spec, what)(t, x, u, current_parameters(system))
     return np.asarray(values, dtype=float).reshape(-1)

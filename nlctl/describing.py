@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -12,6 +12,7 @@ import numpy as np
 from .annotations import as_annotated
 from .arguments import ATOL, RTOL, number
 from .attributes import described_record
+from .blocks import Block
 from .diagrams import initial_state, interconnect, known_system
 from .errors import DivergedError, ParameterError
 from .native import Compiled
@@ -31,12 +32,12 @@ _GONE = 1e-6  # of the predicted amplitude: it has died out
 _RIGS: WeakKeyDictionary[Any, tuple[Any, Compiled]] = WeakKeyDictionary()
 
 
-def _sine(t: float, x: Any, u: Any, params: Mapping[str, float]) -> list[Any]:
+def _sine(t: float, x: object, u: object, params: Mapping[str, float]) -> list[Any]:
     """u = A sin(omega t)."""
     return [params["A"] * np.sin(params["omega"] * t)]
 
 
-def _harmonic(t: float, x: Any, u: Any, params: Mapping[str, float]) -> list[Any]:
+def _harmonic(t: float, x: object, u: np.ndarray, params: Mapping[str, float]) -> list[Any]:
     """The integrands of the first Fourier coefficients of v."""
     phase = params["omega"] * t
     return [u[0] * np.sin(phase), u[0] * np.cos(phase)]
@@ -45,7 +46,7 @@ def _harmonic(t: float, x: Any, u: Any, params: Mapping[str, float]) -> list[Any
 @as_annotated
 def describing_function(
     block: ct.NonlinearIOSystem,
-    amplitudes: Any,
+    amplitudes: object,
     omega: float = 1.0,
     *,
     params: Mapping[str, Any] | None = None,
@@ -130,7 +131,7 @@ def _rig(block: Any) -> Compiled:
     return compiled
 
 
-def _ends(block: Any) -> tuple[str, str]:
+def _ends(block: Block) -> tuple[str, str]:
     """Return the input and the output of a block, as lists of connections have them."""
     return f"{block.name}.{block.input_labels[0]}", f"{block.name}.{block.output_labels[0]}"
 
@@ -173,7 +174,7 @@ class LimitCycle:
 
 @as_annotated
 def limit_cycles(
-    system: ct.LTI, block: ct.NonlinearIOSystem, amplitudes: Any, omega: Any = None
+    system: ct.LTI, block: ct.NonlinearIOSystem, amplitudes: object, omega: object = None
 ) -> list[LimitCycle]:
     """Return the limit cycles of a linear system with a block in its negative feedback.
 
@@ -219,7 +220,7 @@ def limit_cycles(
     return [_cycle(system, block, float(a), float(w)) for a, w in response.intersections]
 
 
-def _response(system: Any, block: Any, amplitudes: Any, omega: Any) -> Any:
+def _response(system: Any, block: object, amplitudes: object, omega: object) -> Any:
     """Return python-control's describing function response."""
     if (system.ninputs, system.noutputs) != (1, 1):
         raise ParameterError(
@@ -232,7 +233,7 @@ def _response(system: Any, block: Any, amplitudes: Any, omega: Any) -> Any:
     return ct.describing_function_response(system, block, A, omega, warn_nyquist=False)
 
 
-def _cycle(system: Any, block: Any, A: float, omega: float) -> LimitCycle:
+def _cycle(system: object, block: Any, A: float, omega: float) -> LimitCycle:
     """Simulate the loop from a predicted cycle on."""
     linear: Any = ct.ss(system)
     linear = ct.ss(
@@ -255,7 +256,7 @@ def _cycle(system: Any, block: Any, A: float, omega: float) -> LimitCycle:
     state[: linear.nstates] = np.imag(resolvent * phasor)
     asked = {"predicted_amplitude": A, "predicted_omega": omega}
 
-    def rises(t: float, x: Any, u: Any, params: Any) -> float:
+    def rises(t: float, x: object, u: object, params: object) -> float:
         return float(row @ np.asarray(x)[: row.size])
 
     rises.direction = 1.0  # type: ignore[attr-defined]
@@ -263,7 +264,7 @@ def _cycle(system: Any, block: Any, A: float, omega: float) -> LimitCycle:
 
 
 def _followed(
-    loop: Compiled, state: np.ndarray, predicted: tuple[float, float], rises: Any
+    loop: Compiled, state: np.ndarray, predicted: tuple[float, float], rises: Callable[..., Any]
 ) -> dict[str, Any]:
     """Return amplitude and frequency that a loop settles at, and how it ended."""
     A, omega = predicted
@@ -305,7 +306,11 @@ def _top(y: np.ndarray) -> float:
 
 @as_annotated
 def describing_function_plot(
-    system: ct.LTI, block: ct.NonlinearIOSystem, amplitudes: Any, omega: Any = None, **kwargs: Any
+    system: ct.LTI,
+    block: ct.NonlinearIOSystem,
+    amplitudes: object,
+    omega: object = None,
+    **kwargs: Any,
 ) -> ct.ControlPlot:
     """Plot the Nyquist curve and -1/N(A), as python-control does, and the simulated limit cycles.
 

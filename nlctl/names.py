@@ -173,7 +173,7 @@ class Parameters(dict[str, Any]):
             self.owners[name] = owner
             dict.__setitem__(self, name, value)
 
-    def update(self, other: Mapping[str, Any] | None = None, /, **kwargs: Any) -> None:  # type: ignore[override]
+    def update(self, other: Mapping[str, Any] | None = None, /, **kwargs: object) -> None:  # type: ignore[override]
         """Override values: with the defaults of the enclosing diagram, or with a user's dict."""
         if isinstance(other, Parameters):
             self._inherit(other)

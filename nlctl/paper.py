@@ -37,7 +37,7 @@ _INTERNAL = ("r", "zeta", "delta_hat", "W_norm")  # a controller of another kind
 
 
 @as_annotated
-def paper_centres(layout: Any, order: int) -> Any:
+def paper_centres(layout: object, order: int) -> Any:
     """Return the centres that a layout name stands for, on [-10, 10]^n.
 
     Examples
@@ -65,8 +65,8 @@ def example_1(
     actuator: Any = None,
     controller: Any = None,
     reference: Any = None,
-    sensor: Any = None,
-    centres: Any = None,
+    sensor: object = None,
+    centres: object = None,
     p1: float | None = None,
     phase: Literal["product", "integral"] | None = None,
     name: str = "example_1",
@@ -101,8 +101,8 @@ def example_2(
     actuator: Any = None,
     controller: Any = None,
     reference: Any = None,
-    sensor: Any = None,
-    centres: Any = None,
+    sensor: object = None,
+    centres: object = None,
     lambdas: tuple[float, float] | None = None,
     v0: float | None = None,
     name: str = "example_2",
@@ -155,7 +155,7 @@ def named_example(name: str) -> Callable[..., ct.InterconnectedSystem]:
     return known[name]
 
 
-def _exclusive(block: str, given: object, **choices: Any) -> None:
+def _exclusive(block: str, given: object, **choices: object) -> None:
     """Refuse a choice that a replaced block would silently ignore."""
     ignored = [name for name, value in choices.items() if value is not None]
     if given is not None and ignored:
@@ -171,7 +171,7 @@ def _closed_loop(
     actuator: Spec,
     controller: Spec,
     reference: Spec,
-    sensor: Any,
+    sensor: object,
     name: str,
 ) -> ct.InterconnectedSystem:
     blocks = {

@@ -189,14 +189,14 @@ def record(cls: type[_T]) -> type[_T]:
     init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
     @functools.wraps(init)
-    def by_name(self: Any, *arguments: Any, **given: Any) -> None:
+    def by_name(self: object, *arguments: object, **given: object) -> None:
         for name in given:
             if name not in known:
                 raise unknown("parameter", name, known, f"of {cls.__name__}", UnknownKeywordError)
         if arguments:
             example = f"{cls.__name__}({known[0]}=...)" if known else f"{cls.__name__}()"
             raise UnknownKeywordError(
-                f"{cls.__name__} takes no positional argument, got {str(arguments[0])[:40]!r}: "
+                f"{cls.__name__} takes no positional argument, got {repr(arguments[0])[:40]}: "
                 f"parameters go by name, {example}"
             )
         init(self, **given)
@@ -209,7 +209,7 @@ def record(cls: type[_T]) -> type[_T]:
     return described
 
 
-def _complete(cls: Any) -> None:
+def _complete(cls: type) -> None:
     """Make the equations of a class static methods, and set what goes without saying."""
     fields = {field.name for field in dataclasses.fields(cls)}
     for name, value in list(vars(cls).items()):
@@ -232,7 +232,7 @@ class _DocstringOfRecord:
         return self.whole
 
 
-def _documented(cls: Any, doc: str) -> str:
+def _documented(cls: type, doc: str) -> str:
     """Return the docstring of a record class with all fields in numpydoc's Parameters."""
     margin = doc.rpartition("\n")[2]  # what stands in front of the closing quotes
     margin = margin if margin.isspace() else ""
@@ -266,7 +266,7 @@ def _inherited_entry(cls: type, name: str) -> list[str]:
     return []
 
 
-def _entry(field: Any, rule: Param | None) -> list[str]:
+def _entry(field: dataclasses.Field[Any], rule: Param | None) -> list[str]:
     """Return the lines of one field: name, type and default; meaning, unit and bounds."""
     kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
     kind = {"Floats": "tuple of float", "Matrix": "tuple of tuple of float"}.get(kind, kind)
@@ -285,18 +285,18 @@ def _default_text(value: Any) -> str:
     return f", default {text}" if text else ", optional"
 
 
-def ensure_checked(spec: Any) -> None:
+def ensure_checked(spec: object) -> None:
     """Check a record that was not checked when it was made, such as a plain dataclass."""
     if not is_checked(spec):
         check_params(spec)
 
 
-def is_checked(spec: Any) -> bool:
+def is_checked(spec: object) -> bool:
     """Whether a record was checked, and made of numbers and tuples, when it was made."""
     return getattr(type(spec), "__checked_at_birth__", False)
 
 
-def declared_params(spec: Any) -> dict[str, Param]:
+def declared_params(spec: object) -> dict[str, Param]:
     """Return ``{field name: Param}`` of a record or record class, in order of definition."""
     return _declared(spec if isinstance(spec, type) else type(spec))
 
@@ -318,7 +318,7 @@ def check_params(spec: Any) -> None:
         spec.check()
 
 
-def _normalised(who: str, name: str, value: object, rule: Param, kind: Any) -> Any:
+def _normalised(who: str, name: str, value: object, rule: Param, kind: object) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
     ndim = rule.ndim
     if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray):
@@ -358,14 +358,14 @@ def integer(who: str, name: str, value: Any, at_least: int, at_most: float = mat
     return int(value)
 
 
-def set_integer(spec: Any, name: str, at_least: int, at_most: float = math.inf) -> None:
+def set_integer(spec: object, name: str, at_least: int, at_most: float = math.inf) -> None:
     """Check an argument of a record, such as an order, and keep it as an int."""
     label = "an order" if name == "order" else name
     value = integer(type(spec).__name__, label, getattr(spec, name), at_least, at_most)
     object.__setattr__(spec, name, value)
 
 
-def checked_times(timepts: Any) -> np.ndarray:
+def checked_times(timepts: object) -> np.ndarray:
     """Return a time grid as a float array."""
     times = as_numbers(timepts)
     if times is None:
@@ -472,7 +472,7 @@ class ParameterRow:
         return str(self.value) if isinstance(self.value, bool) else f"{self.value:g}"
 
 
-def record_rows(spec: Any, path: str = "") -> list[ParameterRow]:
+def record_rows(spec: object, path: str = "") -> list[ParameterRow]:
     """Return the parameter table of a record, with names that begin with `path`."""
     return [
         ParameterRow(

@@ -13,7 +13,7 @@ from .errors import UsageError
 class ByValue:
     """Stands in a pickle for what has no name there, such as a function in a function."""
 
-    def __init__(self, who: str, field: str, value: Any) -> None:
+    def __init__(self, who: str, field: str, value: object) -> None:
         self.who, self.field, self.value = who, field, value
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -30,19 +30,19 @@ class ByValue:
         return self
 
 
-def state_of(record: Any, fields: tuple[str, ...]) -> dict[str, Any]:
+def state_of(record: object, fields: tuple[str, ...]) -> dict[str, Any]:
     """Return the fields of a record, for a pickle, and nothing that follows from them."""
     return {name: _sent(record, name, getattr(record, name)) for name in fields}
 
 
-def with_state(record: Any, state: dict[str, Any]) -> None:
+def with_state(record: object, state: dict[str, Any]) -> None:
     """Write the fields of a record that was pickled or copied."""
     for name, value in state.items():
         whole = value.value if isinstance(value, ByValue) else value
         object.__setattr__(record, name, whole)
 
 
-def _sent(record: Any, name: str, value: Any) -> Any:
+def _sent(record: object, name: str, value: object) -> Any:
     if not callable(value):
         return value
     try:

@@ -37,7 +37,7 @@ def probed(
                 )
 
 
-def _called(who: str, spec: Any, what: str, x: np.ndarray, u: np.ndarray, p: Any) -> Any:
+def _called(who: str, spec: object, what: str, x: np.ndarray, u: np.ndarray, p: Any) -> Any:
     """Return what an equation returns; what it raises becomes a sentence."""
     function = getattr(spec, what)
     check_arguments(who, what, function, ("t", "x", "u", "p"))
@@ -56,7 +56,7 @@ def _called(who: str, spec: Any, what: str, x: np.ndarray, u: np.ndarray, p: Any
         ) from error
 
 
-def check_arguments(who: str, what: str, function: Any, taken: tuple[str, ...]) -> None:
+def check_arguments(who: str, what: str, function: object, taken: tuple[str, ...]) -> None:
     """Refuse what is not a function, and one that cannot be called as equations are."""
     needed = f"{what}({', '.join(taken)})"
     if not callable(function):
@@ -66,7 +66,8 @@ def check_arguments(who: str, what: str, function: Any, taken: tuple[str, ...]) 
         signature.bind(*taken)
     except TypeError:
         static = ", a static method" if taken[-1] == "p" else ""
-        raise BlockError(f"{who} needs {needed}{static}, got {what}{signature}") from None
+        how = f": write @nlctl.equation above {what}" if inspect.ismethod(function) else ""
+        raise BlockError(f"{who} needs {needed}{static}, got {what}{signature}{how}") from None
     except ValueError:  # a function in C that does not say what it takes
         return
 

@@ -8,6 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
 
 from .annotations import as_annotated
 from .arguments import ATOL, RTOL, number, one_of, tolerances
@@ -45,8 +47,8 @@ NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not kno
 @as_annotated
 def input_output_response(
     system: ct.NonlinearIOSystem | Compiled,
-    timepts: Any = None,
-    inputs: Any = 0.0,
+    timepts: ArrayLike | None = None,
+    inputs: object = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
     params: Mapping[str, Any] | None = None,
@@ -54,13 +56,13 @@ def input_output_response(
     method: str | Tableau | None = None,
     rtol: float = RTOL,
     atol: float = ATOL,
-    evaluation_times: Any = "T",
+    evaluation_times: object = "T",
     hold: str = "foh",
     squeeze: bool | None = None,
     transpose: bool = False,
     return_states: bool = False,
     ignore_errors: bool = False,
-    audit: Any = True,
+    audit: object = True,
     solve_ivp_method: str | None = None,
     solve_ivp_kwargs: Mapping[str, Any] | None = None,
     max_steps: int | None = None,
@@ -69,7 +71,7 @@ def input_output_response(
     stop_when: Callable[..., Any] | None = None,
     events: WatchedEvents | None = None,
     progress: Callable[[float], object] | None = None,
-    **aliases: Any,
+    **aliases: object,
 ) -> Response:
     """Simulate a block or diagram, as machine code or in python-control.
 
@@ -268,7 +270,7 @@ def _computed(run: RunArguments, engine: str) -> Response:
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
 
 
-def _known(system: System, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
+def _known(system: System, params: Any, times: np.ndarray, watched: tuple[Watched, ...]) -> Known:
     """Return what is known of the conditions of a diagram that python-control is to run."""
     from .native.known import known_conditions  # late: needs numba
 

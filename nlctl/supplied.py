@@ -50,6 +50,6 @@ def supplying(outputs: Mapping[Any, SuppliedOutput]) -> Iterator[None]:
         _NOW.reset(token)
 
 
-def supplied_now(block: Any) -> SuppliedOutput | None:
+def supplied_now(block: object) -> SuppliedOutput | None:
     """Return what is supplied to a block now, None if nothing is."""
     return (_NOW.get() or {}).get(id(block))

@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import control as ct
 import numpy as np
 from rich.console import Console
 from rich.table import Table
@@ -24,7 +25,11 @@ _STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
 
 
 def random_start(
-    diagram: Any, start: Mapping[str, float], count: int, spread: float, seed: int
+    diagram: ct.InterconnectedSystem,
+    start: Mapping[str, float],
+    count: int,
+    spread: float,
+    seed: int,
 ) -> dict[str, Any]:
     """Draw the plant's initial states, uniformly within `spread` of where it would start."""
     if not 0 < spread < np.inf:
@@ -41,7 +46,10 @@ def random_start(
 
 
 def interpreted_runs(
-    diagram: Any, horizon: float, start: Mapping[str, Any], params: Mapping[str, Any]
+    diagram: ct.InterconnectedSystem,
+    horizon: float,
+    start: Mapping[str, Any],
+    params: Mapping[str, Any],
 ) -> list[Any]:
     """Return runs of python-control, one for each member of an ensemble."""
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,7 +87,7 @@ def _console() -> Console:
     return console if console.is_terminal else Console(width=_WIDEST)
 
 
-def _show(name: str, thing: Any) -> None:
+def _show(name: str, thing: object) -> None:
     """Print one block or one kind."""
     from ..studies.kind import Kind
 
@@ -157,7 +158,7 @@ def _show_paper(key: str) -> None:
     _show_table(key, f"{_summary(module)}  Its page: nlctl report {key}", table)
 
 
-def _show_function(name: str, function: Any) -> None:
+def _show_function(name: str, function: Callable[..., Any]) -> None:
     """Print the arguments of a function that makes blocks, and what signals these have."""
     table = Table("argument", "default", "meaning", title=None)
     meanings = _documented_arguments(inspect.getdoc(function) or "")
@@ -185,7 +186,7 @@ def _documented_arguments(docstring: str) -> dict[str, str]:
     return meanings
 
 
-def _signals_of_system(function: Any) -> str:
+def _signals_of_system(function: Callable[..., Any]) -> str:
     """Return the signals of what a function makes of its defaults, if it makes anything of them."""
     try:
         system = function()
@@ -218,5 +219,5 @@ def _plain(markdown: str) -> str:
     return markdown.replace("`", "")
 
 
-def _summary(documented: Any) -> str:
+def _summary(documented: object) -> str:
     return (documented.__doc__ or "").strip().splitlines()[0]

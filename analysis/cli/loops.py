@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 
 if TYPE_CHECKING:
+    import control as ct
     import numpy as np
 
     from nlctl.upstream.systems import System
@@ -44,7 +45,7 @@ def named_loop(name: str) -> Any:
     return in_state_space(loop)
 
 
-def _check_takes_nothing(name: str, function: Any) -> None:
+def _check_takes_nothing(name: str, function: Callable[..., Any]) -> None:
     """Refuse a function that cannot be called without arguments."""
     try:
         signature = inspect.signature(function)
@@ -58,7 +59,7 @@ def _check_takes_nothing(name: str, function: Any) -> None:
         return
 
 
-def in_state_space(system: Any) -> Any:
+def in_state_space(system: object) -> Any:
     """Return a diagram with states: a transfer function as a control.StateSpace of its signals."""
     import control as ct
 
@@ -109,7 +110,9 @@ def input_values(diagram: System, texts: Sequence[str]) -> np.ndarray:
     return np.array([values[name] for name in labels])
 
 
-def assignments(diagram: Any, texts: Sequence[str]) -> tuple[dict[str, Any], dict[str, float]]:
+def assignments(
+    diagram: ct.InterconnectedSystem, texts: Sequence[str]
+) -> tuple[dict[str, Any], dict[str, float]]:
     """Sort ``NAME=VALUE`` texts into parameters and initial states; names must exist."""
     from nlctl.diagrams import parameter_names
     from nlctl.names import base_name, find_name

@@ -308,7 +308,7 @@ def _say_warnings() -> None:
     """Print warnings of nlctl as sentences; others stay as Python has them."""
     usual = warnings.showwarning
 
-    def shown(message: Any, category: Any, *place: Any, **more: Any) -> None:
+    def shown(message: Any, category: Any, *place: Any, **more: object) -> None:
         if category.__module__.partition(".")[0] == "nlctl":
             error_line(f"nlctl: {message}")
         else:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-from typing import Any
 
 _ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
@@ -37,7 +36,7 @@ def error_text(error: Exception) -> str:
     return str(error)
 
 
-def in_json(content: Any) -> str:
+def in_json(content: object) -> str:
     """Return content as JSON that is safe to print."""
     text = json.dumps(content, indent=1, ensure_ascii=False)
     return _ORDERS.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

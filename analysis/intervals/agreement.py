@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -31,7 +31,7 @@ class TimeRead(Exception):  # noqa: N818 (it ends an evaluation; nobody else see
     """The time was read."""
 
 
-def _refused(*_: Any, **__: Any) -> NoReturn:
+def _refused(*_: object, **__: object) -> NoReturn:
     raise TimeRead
 
 
@@ -79,7 +79,7 @@ def agreeing(function: Callable[..., Any], refusal: _Refusal) -> Callable[..., A
         raise refusal(_ASKED.format(question))
     calls = itertools.count()
 
-    def called(*arguments: Any) -> Any:
+    def called(*arguments: object) -> Any:
         before = decided_so_far()
         with quiet():
             result = function(*arguments)
@@ -98,7 +98,7 @@ def on_balls(
     # Wherever it does not fail it is also called with floats, see `agreeing`.
     compared = agreeing(function, refusal)
 
-    def called(*arguments: Any) -> Any:
+    def called(*arguments: object) -> Any:
         try:
             result = compared(*arguments)
         except (Undecided, UsageError):
@@ -117,7 +117,7 @@ def one_number(function: Callable[..., Any], refusal: _Refusal) -> Callable[...,
     """Return a function as `on_balls` does, that gives one number and nothing else."""
     compared = on_balls(function, refusal)
 
-    def called(*arguments: Any) -> Any:
+    def called(*arguments: object) -> Any:
         result = compared(*arguments)
         if isinstance(result, np.ndarray) and not result.ndim:  # of np.where
             result = result.item()
@@ -132,7 +132,7 @@ def several_numbers(function: Callable[..., Any], refusal: _Refusal) -> Callable
     """Return a function as `on_balls` does, that gives a tuple, list or array of numbers."""
     compared = on_balls(function, refusal)
 
-    def called(*arguments: Any) -> tuple[Any, ...]:
+    def called(*arguments: object) -> tuple[Any, ...]:
         result = compared(*arguments)
         if isinstance(result, tuple | list | np.ndarray) and np.ndim(result) <= 1:
             parts = tuple(_elements(result))
@@ -143,12 +143,16 @@ def several_numbers(function: Callable[..., Any], refusal: _Refusal) -> Callable
     return called
 
 
-def _kind_of(result: Any) -> str:
+def _kind_of(result: object) -> str:
     return f"an object of type {type(result).__name__}"
 
 
 def _compare(
-    function: Callable[..., Any], arguments: Any, result: Any, n: int, refusal: _Refusal
+    function: Callable[..., Any],
+    arguments: Sequence[Any],
+    result: object,
+    n: int,
+    refusal: _Refusal,
 ) -> None:
     """Call a function with floats inside of balls, and compare."""
     point = _Point(n)
@@ -180,7 +184,11 @@ def _compare(
 
 
 def _compare_quotients(
-    function: Any, arguments: Any, point: _Point, results: Any, refusal: _Refusal
+    function: Any,
+    arguments: Sequence[Any],
+    point: _Point,
+    results: Sequence[Any],
+    refusal: _Refusal,
 ) -> None:
     """Compare difference quotients with those of floats."""
     values, balls = results
@@ -200,7 +208,9 @@ def _compare_quotients(
                 )
 
 
-def _on_floats(function: Any, floats: Any, refusal: _Refusal) -> list[float] | None:
+def _on_floats(
+    function: Callable[..., Any], floats: tuple[float, ...], refusal: _Refusal
+) -> list[float] | None:
     """Return what a function makes of floats; None for an error."""
     try:
         with np.errstate(all="ignore"):
@@ -213,7 +223,7 @@ def _on_floats(function: Any, floats: Any, refusal: _Refusal) -> list[float] | N
         return None
 
 
-def _at_point(function: Any, floats: Any) -> list[arb]:
+def _at_point(function: Callable[..., Any], floats: tuple[float, ...]) -> list[arb]:
     """Return what a function makes of balls without width; nothing where that is undecided."""
     try:
         return [_value(ball) for ball in _elements(function(*map(_thin, floats)))]
@@ -233,7 +243,7 @@ def _thin(thing: Any) -> Any:
     return thing
 
 
-def _elements(result: Any) -> Iterator[Any]:
+def _elements(result: object) -> Iterator[Any]:
     """Yield the numbers of a result, in order."""
     if isinstance(result, tuple | list | np.ndarray) and np.ndim(result):
         for part in result:
@@ -244,7 +254,7 @@ def _elements(result: Any) -> Iterator[Any]:
         yield result.item() if isinstance(result, np.ndarray) else result
 
 
-def _value(ball: Any) -> arb:
+def _value(ball: object) -> arb:
     enclosed = as_ball(ball.here if isinstance(ball, Slope) else ball)
     return arb.nan() if enclosed is NotImplemented else enclosed.value
 
@@ -265,24 +275,28 @@ class _Point:
         self.any = self.lost = False
         self.slope: float | None = None
 
-    def inside(self, thing: Any) -> Any:
+    def inside(self, argument: Any) -> Any:
         """Return an argument with floats instead of balls."""
-        if thing is UNREAD:
+        if argument is UNREAD:
             return 0.0
-        if isinstance(thing, Slope):
-            number = self._number(thing.here.value)  # at rest, too: the others stay where they are
+        if isinstance(argument, Slope):
+            number = self._number(
+                argument.here.value
+            )  # at rest, too: the others stay where they are
             self.slope = 0.0 if self.rest else number
             return self.slope
-        if isinstance(thing, Ball):
-            return self._number(thing.value)
-        if type(thing) in (tuple, list):
-            return type(thing)(map(self.inside, thing))
-        if isinstance(thing, np.ndarray) and thing.dtype == object:
-            return np.array([self.inside(v) for v in thing.flat], dtype=float).reshape(thing.shape)
-        if isinstance(thing, Sum | Written):  # it has no point
+        if isinstance(argument, Ball):
+            return self._number(argument.value)
+        if type(argument) in (tuple, list):
+            return type(argument)(map(self.inside, argument))
+        if isinstance(argument, np.ndarray) and argument.dtype == object:
+            return np.array([self.inside(v) for v in argument.flat], dtype=float).reshape(
+                argument.shape
+            )
+        if isinstance(argument, Sum | Written):  # it has no point
             self.lost = True
             return math.nan
-        return thing
+        return argument
 
     def _number(self, ball: arb) -> float:
         self.any = True

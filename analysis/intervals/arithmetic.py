@@ -128,25 +128,25 @@ class Ball(NumPyFunctions):
         return Ball(-self.value, tuple(-g for g in self.gradient))
 
     @of_lifted
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Ball) -> Any:
         result = self._joined(self.value + other.value, 1, other, 1)
         return result.known_not_negative(self.not_negative and other.not_negative)
 
     @of_lifted
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: Ball) -> Any:
         if other is self and self.value.is_finite():
             return Ball(arb(0))  # one quantity, not two in the same range
         return self._joined(self.value - other.value, 1, other, -1)
 
     @of_lifted
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Ball) -> Any:
         if other is self:
             return self**2
         result = self._joined(self.value * other.value, other.value, other, self.value)
         return result.known_not_negative(self.not_negative and other.not_negative)
 
     @of_lifted
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Ball) -> Any:
         value = self.value / other.value
         result = self._joined(value, 1 / other.value, other, -value / other.value)
         return result.known_not_negative(self.not_negative and other.not_negative)
@@ -162,7 +162,7 @@ class Ball(NumPyFunctions):
     def __abs__(self) -> Ball:
         return self.maximum(-self).known_not_negative()
 
-    def minimum(self, other: Any) -> Ball:
+    def minimum(self, other: Ball) -> Ball:
         """Smaller one; where balls overlap, the derivative is one or the other.
 
         Parameters
@@ -179,7 +179,7 @@ class Ball(NumPyFunctions):
         both = self.not_negative and other.not_negative
         return self._extreme(other, arb.min).known_not_negative(both)
 
-    def maximum(self, other: Any) -> Ball:
+    def maximum(self, other: Ball) -> Ball:
         """Larger one; where balls overlap, the derivative is one or the other.
 
         Parameters
@@ -256,7 +256,7 @@ class Ball(NumPyFunctions):
             slope = ((arb.pi() * x).cos() - x.sinc_pi()) / x
         return self.chain(value, common(slope, bound))
 
-    def pair(self, name: str, other: Any) -> Any:
+    def pair(self, name: str, other: Ball) -> Any:
         """Return phi of this ball and another one, for the NumPy function of that name.
 
         Parameters
@@ -298,7 +298,7 @@ class Ball(NumPyFunctions):
         return self.chain(*enclosed_table(self.value, xp, fp))
 
     @staticmethod
-    def lifted(number: Any) -> Any:
+    def lifted(number: object) -> Any:
         """Return a number as a ball.
 
         Parameters
@@ -313,7 +313,7 @@ class Ball(NumPyFunctions):
         """
         return as_ball(number)
 
-    def _compared(self, order: str, other: Any) -> Any:
+    def _compared(self, order: str, other: Ball) -> Any:
         given, other, holds = other, as_ball(other), _ORDERS[order]
         if other is NotImplemented:
             return other
@@ -359,7 +359,7 @@ def power(x: arb, n: int) -> arb:
     return around.union(arb(0)) if n > 0 and n % 2 == 0 and x.contains(0) else around
 
 
-def as_ball(x: Any) -> Any:
+def as_ball(x: object) -> Any:
     """Return a number as a ball without width; NotImplemented for what is not a number.
 
     Examples

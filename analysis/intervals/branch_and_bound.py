@@ -328,7 +328,7 @@ def _supremum(function: _Function, box: Box, tol: float, max_boxes: int) -> Supr
     return Supremum(high=max(bounds), attained=best, boxes=boxes, unbounded=lost)
 
 
-def upper(ball: Any) -> float:
+def upper(ball: object) -> float:
     """Return the upper end of a ball as a float, rounded up; infinite for what is not a number.
 
     Examples

@@ -142,7 +142,7 @@ def _conditions(
     ]
 
 
-def _compared(name: str, function: Any) -> Any:
+def _compared(name: str, function: Callable[..., Any]) -> Any:
     """Return a function that is compared with itself on floats."""
     numbers = one_number if name == "V" else several_numbers
     return numbers(

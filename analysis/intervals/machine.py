@@ -59,7 +59,7 @@ class Readable:
     # the expressions, by sides
     read: dict[int, tuple[Graph, Sequence[Expr]]] = field(default_factory=dict, compare=False)
 
-    def __call__(self, *given: Any) -> Any:
+    def __call__(self, *given: object) -> Any:
         return self.of_balls(*given)
 
 

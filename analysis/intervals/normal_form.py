@@ -89,7 +89,7 @@ def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
     return total
 
 
-def as_sum(x: Any) -> Any:
+def as_sum(x: object) -> Any:
     """Return a number as a sum; NotImplemented for what is not a number."""
     if isinstance(x, Sum):
         return x
@@ -144,7 +144,7 @@ class Sum(NumPyFunctions):
         """Its terms, to be compared: of sums themselves no comparison has an answer."""
         return frozenset(self.terms.items())
 
-    def _compared(self, order: str, other: Any) -> Any:
+    def _compared(self, order: str, other: object) -> Any:
         raise Undecided("a comparison of symbols has no answer for all values")
 
     def coefficient(self, product: Product) -> Fraction:
@@ -162,14 +162,14 @@ class Sum(NumPyFunctions):
         return Sum({product: -c for product, c in self.terms.items()}, self.partial)
 
     @of_lifted
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Sum) -> Any:
         terms = dict(self.terms)
         for product, c in other.terms.items():
             terms[product] = terms.get(product, Fraction(0)) + c
         return Sum(terms, self.partial | other.partial)
 
     @of_lifted
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Sum) -> Any:
         terms: dict[Product, Fraction] = {}
         for one, c in self.terms.items():
             for two, d in other.terms.items():
@@ -181,7 +181,7 @@ class Sum(NumPyFunctions):
         return Sum(terms, self.partial | other.partial)
 
     @of_lifted
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Sum) -> Any:
         constant = other.coefficient(_ONE)
         if other.key() == {(_ONE, constant)} and not other.partial:
             return self * (1 / constant)

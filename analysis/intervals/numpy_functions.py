@@ -77,7 +77,7 @@ class NumPyFunctions:
         return self * other
 
     @of_lifted
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: object) -> Any:
         return other / self
 
     def __pow__(self, n: Any) -> Any:
@@ -94,10 +94,12 @@ class NumPyFunctions:
     def __bool__(self) -> bool:
         return self != 0
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
+    def __array_ufunc__(self, ufunc: object, method: str, *inputs: object, **kwargs: object) -> Any:
         return getattr(_of_objects(ufunc), method)(*map(_objects, inputs), **kwargs)
 
-    def __array_function__(self, function: Any, types: Any, given: Any, named: Any) -> Any:
+    def __array_function__(
+        self, function: Callable[..., Any], types: object, given: Any, named: Any
+    ) -> Any:
         if function in _ARRAY_FUNCTIONS:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
@@ -105,7 +107,7 @@ class NumPyFunctions:
     def __floordiv__(self, other: object) -> Any:
         return (self / other).apply("floor")  # type: ignore[operator]
 
-    def __rfloordiv__(self, other: Any) -> Any:
+    def __rfloordiv__(self, other: object) -> Any:
         return (other / self).apply("floor")
 
     def __divmod__(self, other: object) -> Any:
@@ -142,12 +144,12 @@ def _pairwise(name: str, a: Any, b: Any) -> Any:
     return (a if kinds[0] == max(kinds) else b.lifted(a)).pair(name, b)
 
 
-def _single(name: str, function: Any, x: Any) -> Any:
+def _single(name: str, function: Callable[..., Any], x: Any) -> Any:
     return x.apply(name) if isinstance(x, NumPyFunctions) else function(x)
 
 
 @functools.cache
-def _of_objects(ufunc: Any) -> Any:
+def _of_objects(ufunc: np.ufunc) -> Any:
     """Return a ufunc that asks objects what NumPy's own would compare, or refuse."""
     name = {"divmod": "", "float_power": "power"}.get(ufunc.__name__, ufunc.__name__)
     if name in _SINGLE and name != "absolute":
@@ -170,7 +172,7 @@ def _of_objects(ufunc: Any) -> Any:
 _LN2 = math.log(2)
 
 
-def _objects(x: Any) -> np.ndarray:
+def _objects(x: object) -> np.ndarray:
     """Return an array of plain objects: NumPy's own numbers would ask the ball in turn."""
     plain = x.item() if isinstance(x, np.generic) else x
     array = np.asarray(plain, dtype=object)
@@ -179,7 +181,9 @@ def _objects(x: Any) -> np.ndarray:
     return array
 
 
-def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None):
+def _interp(
+    x: Any, xp: object, fp: object, left: object = None, right: object = None, period: object = None
+):
     """Return np.interp of objects."""
     if left is not None or right is not None or period is not None:
         raise TypeError("np.interp with left, right or period has no enclosure")

@@ -57,7 +57,7 @@ class Decisions:
         return self.taken[-1]
 
 
-def _same_number(a: Any, b: Any) -> bool:
+def _same_number(a: object, b: object) -> bool:
     """Whether both are numbers without width, and equal."""
     return isinstance(a, arb) and isinstance(b, arb) and a.is_exact() and bool(a == b)
 

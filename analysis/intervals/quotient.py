@@ -7,6 +7,7 @@ the quotient has no pole for balls that contain v = 0.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from flint import arb
@@ -41,11 +42,11 @@ class Slope(NumPyFunctions):
         return Slope(-self.here, -self.base, -self.quotient)
 
     @of_lifted
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Slope) -> Any:
         return Slope(self.here + other.here, self.base + other.base, self.quotient + other.quotient)
 
     @of_lifted
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Slope) -> Any:
         if other.is_constant:  # not 0 times v, which is nothing where v is unbounded
             quotient = other.base * self.quotient
         elif self.is_constant:
@@ -58,7 +59,7 @@ class Slope(NumPyFunctions):
         return Slope(self.here * other.here, self.base * other.base, quotient)
 
     @of_lifted
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Slope) -> Any:
         base = self.base / other.base
         quotient = (self.quotient - base * other.quotient) / other.here
         return Slope(self.here / other.here, base, quotient)
@@ -74,7 +75,7 @@ class Slope(NumPyFunctions):
         """Larger one, where that is decided."""
         return self if self >= other else other
 
-    def pair(self, name: str, other: Any) -> Any:
+    def pair(self, name: str, other: Slope) -> Any:
         """Return phi of this and another quantity for the NumPy function of that name."""
         # By the mean value theorem: the derivatives are those between v and 0.
         other = self.lifted(other)
@@ -96,7 +97,7 @@ class Slope(NumPyFunctions):
         return Slope(here, base, self.quotient * of_unknown_slope(slope, self.quotient))
 
     @staticmethod
-    def lifted(number: Any) -> Any:
+    def lifted(number: object) -> Any:
         """Return a number as a quantity that does not depend on v."""
         if isinstance(number, Slope):
             return number
@@ -112,7 +113,7 @@ class Slope(NumPyFunctions):
         secant = _secant(name, self.here, self.base, here, base)
         return Slope(here, base, secant * self.quotient)
 
-    def _compared(self, order: str, other: Any) -> Any:
+    def _compared(self, order: str, other: Slope) -> Any:
         """A quotient exists within one branch only."""
         other = self.lifted(other)
         if other is NotImplemented:
@@ -160,7 +161,7 @@ def _secant_of_jump(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball
     return of_unknown_slope(mean, distance)
 
 
-def slope_in(function: Any, v: Any) -> Ball:
+def slope_in(function: Callable[..., Any], v: Any) -> Ball:
     """Return (q(v) - q(0)) / v for a function q of one number, as a ball."""
     result = function(Slope(as_ball(v), Ball(arb(0)), Ball(arb(1))))
     return result.quotient if isinstance(result, Slope) else Ball(arb(0))

@@ -19,7 +19,7 @@ from .pairs import FUNCTIONS_OF_TWO
 from .paths import undecided
 
 
-def as_rate(x: Any) -> Any:
+def as_rate(x: object) -> Any:
     """Return a number as a quantity that does not change; NotImplemented for what is none."""
     if isinstance(x, Rate):
         return x
@@ -41,17 +41,17 @@ class Rate(NumPyFunctions):
         return Rate(-self.here, -self.rate)
 
     @of_lifted
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Rate) -> Any:
         return Rate(self.here + other.here, self.rate + other.rate)
 
     @of_lifted
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Rate) -> Any:
         if other is self:
             return self**2
         return Rate(self.here * other.here, self.here * other.rate + other.here * self.rate)
 
     @of_lifted
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Rate) -> Any:
         value = self.here / other.here
         return Rate(value, (self.rate - value * other.rate) / other.here)
 
@@ -62,12 +62,12 @@ class Rate(NumPyFunctions):
     def __abs__(self) -> Rate:
         return self._chosen(-self, abs(self.here))
 
-    def minimum(self, other: Any) -> Rate:
+    def minimum(self, other: Rate) -> Rate:
         """Smaller one; where that is open the rate is one or the other."""
         other = as_rate(other)
         return self._chosen(other, self.here.minimum(other.here))
 
-    def maximum(self, other: Any) -> Rate:
+    def maximum(self, other: Rate) -> Rate:
         """Larger one; where that is open the rate is one or the other."""
         other = as_rate(other)
         return self._chosen(other, self.here.maximum(other.here))
@@ -90,7 +90,7 @@ class Rate(NumPyFunctions):
             return Rate(here, of_unknown_slope(slope, self.here) * self.rate)
         return Rate(here, as_ball(FUNCTIONS[name].derivative[0](self.here)) * self.rate)
 
-    def pair(self, name: str, other: Any) -> Any:
+    def pair(self, name: str, other: Rate) -> Any:
         """Return phi of this and another quantity for the NumPy function of that name."""
         other = as_rate(other)
         if other is NotImplemented:
@@ -109,7 +109,7 @@ class Rate(NumPyFunctions):
 
     lifted = staticmethod(as_rate)
 
-    def _compared(self, order: str, other: Any) -> Any:
+    def _compared(self, order: str, other: Rate) -> Any:
         """A choice between formulas may jump: only what the whole box decides is followed."""
         other = as_rate(other)
         if other is NotImplemented:

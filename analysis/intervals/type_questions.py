@@ -52,7 +52,7 @@ _OF_BUILTINS = {id(getattr(builtins, name)): name for name in _BUILTINS if hasat
 _MOST = 2_000
 
 
-def type_question(function: Any) -> str | None:
+def type_question(function: object) -> str | None:
     """Return what a function, or one that it calls, asks of its arguments; None for nothing.
 
     Examples
@@ -91,27 +91,27 @@ def _module_of(thing: object) -> str:
     return str(getattr(thing, "__module__", "")).partition(".")[0] if named else ""
 
 
-def _reached(thing: object) -> Iterator[Any]:
+def _reached(member: object) -> Iterator[Any]:
     """Yield the functions, and what else it reads, that a thing is made of."""
-    if isinstance(thing, staticmethod | classmethod):
-        yield thing.__func__
-    elif isinstance(thing, types.MethodType):
-        yield thing.__func__
-        code = getattr(thing.__func__, "__code__", None)
-        yield from _of_object(thing.__self__, set(_names(code)) if code else set())
-    elif isinstance(thing, property):
-        yield thing.fget
-    elif isinstance(thing, functools.partial):
-        yield from (thing.func, *thing.args, *thing.keywords.values())
-    elif isinstance(thing, types.FunctionType):
-        yield from _of_function(thing)
-    elif isinstance(thing, types.CodeType):
-        yield from (part for part in thing.co_consts if isinstance(part, types.CodeType))
-    elif isinstance(thing, tuple | list | dict) and len(thing) < 50:
-        parts = thing.values() if isinstance(thing, dict) else thing
+    if isinstance(member, staticmethod | classmethod):
+        yield member.__func__
+    elif isinstance(member, types.MethodType):
+        yield member.__func__
+        code = getattr(member.__func__, "__code__", None)
+        yield from _of_object(member.__self__, set(_names(code)) if code else set())
+    elif isinstance(member, property):
+        yield member.fget
+    elif isinstance(member, functools.partial):
+        yield from (member.func, *member.args, *member.keywords.values())
+    elif isinstance(member, types.FunctionType):
+        yield from _of_function(member)
+    elif isinstance(member, types.CodeType):
+        yield from (part for part in member.co_consts if isinstance(part, types.CodeType))
+    elif isinstance(member, tuple | list | dict) and len(member) < 50:
+        parts = member.values() if isinstance(member, dict) else member
         yield from (part for part in parts if callable(part))
     else:
-        yield from _of_object(thing, set())
+        yield from _of_object(member, set())
 
 
 def _of_function(function: types.FunctionType) -> Iterator[Any]:
@@ -134,17 +134,17 @@ def _of_function(function: types.FunctionType) -> Iterator[Any]:
         yield from _of_object(thing, names)
 
 
-def _of_object(thing: object, names: set[str]) -> Iterator[Any]:
+def _of_object(owner: object, names: set[str]) -> Iterator[Any]:
     """Yield what is called of an object, a class or a module: by name, or by operators."""
-    if isinstance(thing, types.ModuleType) and _is_of_library(thing.__name__):
+    if isinstance(owner, types.ModuleType) and _is_of_library(owner.__name__):
         return
-    if not isinstance(thing, type | types.FunctionType | types.ModuleType):
-        yield getattr(thing, "py_func", None)  # numba's
-        yield getattr(thing, "__wrapped__", None)
-        yield getattr(thing, "pyfunc", None)  # of np.vectorize
-    fields = {} if isinstance(thing, type) else getattr(thing, "__dict__", {})
+    if not isinstance(owner, type | types.FunctionType | types.ModuleType):
+        yield getattr(owner, "py_func", None)  # numba's
+        yield getattr(owner, "__wrapped__", None)
+        yield getattr(owner, "pyfunc", None)  # of np.vectorize
+    fields = {} if isinstance(owner, type) else getattr(owner, "__dict__", {})
     members: dict[str, Any] = {}
-    for kind in reversed(thing.__mro__ if isinstance(thing, type) else type(thing).__mro__):
+    for kind in reversed(owner.__mro__ if isinstance(owner, type) else type(owner).__mro__):
         members |= {} if _is_of_library(kind.__module__) else vars(kind)
     members |= fields
     waiting, done = (names | _OPERATORS) & set(members), set()
@@ -194,7 +194,7 @@ def _question_in(code: types.CodeType) -> str | None:
     return f"catches exceptions in {code.co_qualname} ('try')" if caught > entered else None
 
 
-def is_of_library(function: Any) -> bool:
+def is_of_library(function: object) -> bool:
     """Whether a function is one of nlctl or of a library, whatever it closes over."""
     code = getattr(getattr(function, "py_func", function), "__code__", None)
     return code is not None and code.co_filename.startswith(_LIBRARIES)

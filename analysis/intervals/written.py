@@ -7,6 +7,7 @@ that are not in the list of `OPERATIONS`, cannot be written.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from .arithmetic import as_ball
@@ -46,14 +47,14 @@ class Written(NumPyFunctions):
         self.nodes = nodes  # operations, each a name with numbers, symbols, or places before it
         self.place = place
 
-    def _node(self, *node: Any) -> Written:
+    def _node(self, *node: object) -> Written:
         place = next((i for i, other in enumerate(self.nodes) if other == list(node)), None)
         if place is None:
             place = len(self.nodes)
             self.nodes.append(list(node))
         return Written(self.nodes, place)
 
-    def lifted(self, number: Any) -> Any:
+    def lifted(self, number: object) -> Any:
         """Return a number as an entry of the same list; NotImplemented for what is none."""
         if isinstance(number, Written):
             return number
@@ -64,7 +65,7 @@ class Written(NumPyFunctions):
             raise Undecided(f"{number} is not a number that can be written exactly")
         return self._node("number", str(exact(float(ball.value))))
 
-    def _with(self, operation: str, other: Any) -> Any:
+    def _with(self, operation: str, other: Written) -> Any:
         other = self.lifted(other)
         return other if other is NotImplemented else self._node(operation, self.place, other.place)
 
@@ -91,7 +92,7 @@ class Written(NumPyFunctions):
             raise Undecided(f"{name} cannot be written")
         return self._node(name, self.place)
 
-    def pair(self, name: str, other: Any) -> Any:
+    def pair(self, name: str, other: Written) -> Any:
         """Return a function of two arguments that is made of those of the list."""
         other = self.lifted(other)
         if other is NotImplemented or name != "hypot":
@@ -102,11 +103,11 @@ class Written(NumPyFunctions):
         """Refuse a table: it is none of the operations."""
         raise Undecided("a table cannot be written")
 
-    def _compared(self, order: str, other: Any) -> Any:
+    def _compared(self, order: str, other: object) -> Any:
         raise Undecided("a comparison cannot be written: use np.minimum, np.maximum or abs")
 
 
-def operations(names: tuple[str, ...], function: Any) -> list[list[Any]]:
+def operations(names: tuple[str, ...], function: Callable[..., Any]) -> list[list[Any]]:
     """Return what a function does with symbols, as a list of which the last entry is its value."""
     nodes: list[list[Any]] = [["symbol", name] for name in names]
     start = Written(nodes, 0)

@@ -175,7 +175,7 @@ def _candidates(
     constants: Constants,
     gains: Gains,
     reach: StateReach,
-    W: Any,
+    W: object,
     Q: float,
 ) -> Iterator[Closure]:
     """Yield boxes around the least one that could close, with their proved constants."""
@@ -192,7 +192,7 @@ def _candidates(
         yield Closure(status="closes", box=ends, C_0=C_0, room=room)
 
 
-def _constants(constants: Constants, box: Box, W: Any) -> Constants:
+def _constants(constants: Constants, box: Box, W: object) -> Constants:
     """Return the constants on a box, with the weights that suit it or, where none are found, 0."""
     try:
         return constants_of(constants.parts, constants.split, box, W)
@@ -206,7 +206,7 @@ def least_bound(
     gains: Gains,
     sides: Sequence[float],
     v: tuple[float, float],
-    W: Any = None,
+    W: object = None,
 ) -> float:
     r"""Return what C_0 of (36) is at least on a box, for Q = 0."""
     # G_max, d* and g are taken at points of the box. Without `W` it is so for every W: by \|W^T

@@ -152,12 +152,12 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
     except ParameterError as error:
         return [c, Line(key="(b)", statement=SAFE, status="undecided", evidence=str(error))]
     crossed = bool(np.any(moved.zeta[moved.time - moved.time[0] < safe.time] >= safe.zeta))
-    kept = "violated" if crossed else "checked"
+    status = "violated" if crossed else "checked"
     evidence = f"T = {safe.time:.4g} s for a monotone zeta or a constant gain"
     b = Line(
         key="(b)",
         statement=SAFE,
-        status=kept if margin.monotone else "not applicable",
+        status=status if margin.monotone else "not applicable",
         evidence=evidence + ("" if margin.monotone else "; here zeta falls and k G varies"),
         follows="k G left its bounds." if margin.monotone and crossed else "",
     )

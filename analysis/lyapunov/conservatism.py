@@ -115,7 +115,7 @@ class Conservatism:
 
 @as_annotated
 def conservatism(
-    loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any
+    loop: ct.InterconnectedSystem | Examination, run: object = 20.0, **settings: Any
 ) -> Conservatism:
     """Take C_0 of (36) apart and set it against a run.
 
@@ -200,7 +200,7 @@ def _delta_shares(given: Premises, constants: Constants) -> tuple[Share, ...]:
     return _shares_of(rows, constants["delta*"])
 
 
-def _shares_of(rows: Iterable[tuple[str, str, Any]], whole: Any) -> tuple[Share, ...]:
+def _shares_of(rows: Iterable[tuple[str, str, Any]], whole: object) -> tuple[Share, ...]:
     return tuple(
         Share(term=term, formula=formula, value=float(v), share=float(v / whole))
         for term, formula, v in rows

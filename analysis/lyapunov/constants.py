@@ -177,7 +177,7 @@ def constants(
     loop: ct.InterconnectedSystem,
     box: Box,
     *,
-    W: Any = None,
+    W: object = None,
     k: tuple[float, float] | None = None,
     times: tuple[float, float] = (0.0, np.inf),
     start: Mapping[str, float] | None = None,
@@ -229,7 +229,7 @@ def constants_of(
     parts: Parts,
     split: Decomposition,
     box: Box,
-    W: Any = None,
+    W: object = None,
     times: tuple[float, float] = (0.0, np.inf),
     tol: float = 1e-3,
 ) -> Constants:
@@ -252,7 +252,7 @@ def constants_of(
 
 
 def _weights(
-    parts: Parts, box: Box, W: Any, rest: float
+    parts: Parts, box: Box, W: object, rest: float
 ) -> tuple[np.ndarray, tuple[Provenance, str]]:
     """Return the weights, and where they come from."""
     nodes = len(parts.gains.W_hat_0)

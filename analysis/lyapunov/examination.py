@@ -57,10 +57,10 @@ class Examination:
 @as_annotated
 def examine(
     loop: ct.InterconnectedSystem,
-    run: Any = 20.0,
+    run: object = 20.0,
     *,
     box: Box | None = None,
-    W: Any = "tightest",
+    W: object = "tightest",
     k: tuple[float, float] | None = None,
     start: Mapping[str, Any] | None = None,
     params: Mapping[str, Any] | None = None,

@@ -144,7 +144,9 @@ class Ledger:
 
 
 @as_annotated
-def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any) -> Ledger:
+def ledger(
+    loop: ct.InterconnectedSystem | Examination, run: object = 20.0, **settings: Any
+) -> Ledger:
     """Check the proof's assumptions and inequalities for a loop, line by line.
 
     Parameters

@@ -102,7 +102,7 @@ def premises(
 
 
 @as_annotated
-def literal(given: Premises, constants: Constants, plant: Any = None) -> Premises | None:
+def literal(given: Premises, constants: Constants, plant: object = None) -> Premises | None:
     """Return the premises of Example 1 as the paper prints them; None for another plant.
 
     There q cos(w t) stands inside g, so that d* bounds 0.1 |x|^2 sin t alone, and eps* the error

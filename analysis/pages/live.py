@@ -18,6 +18,7 @@ from nlctl.faults.effects import NEVER
 from nlctl.plotting.bands import quantile, upper_envelope
 from nlctl.responses.arguments import state_array
 from nlctl.responses.time_response import as_response
+from nlctl.upstream.systems import SystemResponse
 
 from ..report.document import Figure, Live, Section
 from ..robustness.stl.formula import And, Band, Formula, Not, Temporal
@@ -205,7 +206,11 @@ def _finite(value: float) -> float:
 
 
 def _command(
-    words: Sequence[str], program: WebProgram, response: Any, base: Mapping[str, Any], loop: str
+    words: Sequence[str],
+    program: WebProgram,
+    response: SystemResponse,
+    base: Mapping[str, Any],
+    loop: str,
 ) -> dict[str, Any]:
     """Return what repeats a run: words of a shell, or the settings of a call of Python."""
     if words:

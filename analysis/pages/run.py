@@ -19,7 +19,10 @@ _SHOWN = 6  # signals of a chart at first
 
 
 def run_section(
-    loop: ct.InputOutputSystem, response: Any, signals: Sequence[str], params: Mapping[str, Any]
+    loop: ct.InputOutputSystem,
+    response: Any,
+    signals: Sequence[str],
+    params: Mapping[str, Any],
 ) -> Section:
     """Return one run: its own parameters, its signals over time, and their ranges."""
     curves = outputs_of_run(response)

@@ -130,7 +130,7 @@ def _with_gain(parts: Parts, start: float, K: float) -> ct.InterconnectedSystem:
 
 
 def _shifted(
-    parts: Parts, start: float, plant: Any, law: Any, **others: Any
+    parts: Parts, start: float, plant: Any, law: object, **others: Any
 ) -> ct.InterconnectedSystem:
     """Return the loop with disturbance and reference as they are from `start` on."""
     reference: Any = parts.roles.spec("reference")

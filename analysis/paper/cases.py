@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -76,7 +75,7 @@ class Case(PaperCase):
     group: str  # ``"published"``, ``"choice"`` or ``"exchange"``.
 
 
-def _case(key: str, title: str, group: str = "choice", **arguments: Any) -> Case:
+def _case(key: str, title: str, group: str = "choice", **arguments: object) -> Case:
     """Return a case of the example that its key begins with."""
     example = int(key[0])
     return Case(

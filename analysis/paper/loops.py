@@ -25,7 +25,7 @@ _WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 def example_1(
     *,
     controller: Any = "paper",
-    actuator: Any = None,
+    actuator: object = None,
     gain: float = 1.0,
     limit: float = _WIDE,
     noise: float | None = None,
@@ -38,7 +38,7 @@ def example_1(
 def example_2(
     *,
     controller: Any = "paper",
-    actuator: Any = None,
+    actuator: object = None,
     gain: float = 1.0,
     limit: float = _WIDE,
     noise: float | None = None,
@@ -84,7 +84,7 @@ def _controller(example: str, controller: Spec) -> Any:
 
 
 def _loop(
-    example: str, body: Any, controller: Spec, gain: float, limit: float, noise: float | None
+    example: str, body: object, controller: Spec, gain: float, limit: float, noise: float | None
 ) -> ct.InterconnectedSystem:
     stages = {"saturation": Saturation(limit=limit), "gain": Gain(k=gain), "body": body}
     return paper_example(example)(

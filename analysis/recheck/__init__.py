@@ -82,7 +82,7 @@ def recheck(content: Any) -> str:
     return f"{said}; for all t >= 0 from {RECHECKED[whole['kind']][1](whole)}"
 
 
-def proved_bounds(content: Any) -> dict[str, Fraction]:
+def proved_bounds(content: object) -> dict[str, Fraction]:
     """Return the bounds that follow from the premises and the proof of a certificate, by name.
 
     Parameters

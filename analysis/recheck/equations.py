@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 from .content import need, read_rational
@@ -39,19 +40,19 @@ class WrittenEquation:
         """Return f(x), f(x_0), s with f(x) = f(x_0) + s (x - x_0), x in `box`, x_0 in `start`."""
         # Coordinates without a name among `names` have the same value in x and x_0.
         values: list[_Slopes] = []
-        for operation, *given in self.nodes:
+        for operation, *operands in self.nodes:
             if operation == "number":
-                number = Interval.of(read_rational(given[0]))
+                number = Interval.of(read_rational(operands[0]))
                 values.append((number, number, [ZERO] * len(names)))
             elif operation == "symbol":
-                need(given[0] in box, f"no range of {given[0]}")
-                unit = [UNITY if name == given[0] else ZERO for name in names]
-                values.append((box[given[0]], start[given[0]], unit))
+                need(operands[0] in box, f"no range of {operands[0]}")
+                unit = [UNITY if name == operands[0] else ZERO for name in names]
+                values.append((box[operands[0]], start[operands[0]], unit))
             elif operation in ("+", "*", "/", "minimum", "maximum"):
-                values.append(_of_two(operation, *(values[i] for i in given)))
+                values.append(_of_two(operation, *(values[i] for i in operands)))
             else:
-                x, x_0, slopes = values[given[0]]
-                value, slope = KNOWN_FUNCTIONS.get(operation) or _power(given[1])
+                x, x_0, slopes = values[operands[0]]
+                value, slope = KNOWN_FUNCTIONS.get(operation) or _power(operands[1])
                 between, here = x.hull(x_0), value(x)  # of the mean value theorem
                 there = here if x is x_0 else value(x_0)
                 moved = [ZERO if s.low == s.high == 0 else slope(between) * s for s in slopes]
@@ -129,7 +130,9 @@ def _of_two(operation: str, one: _Slopes, two: _Slopes) -> _Slopes:
     return here, there, [a.hull(b) for a, b in both]  # between them, whichever is taken
 
 
-def stays(enclosed: Callable[[_Box], Interval], box: _Box, low: Any, high: Any, line: str) -> None:
+def stays(
+    enclosed: Callable[[_Box], Interval], box: _Box, low: Fraction, high: Fraction, line: str
+) -> None:
     """Prove low <= f <= high on a box, by halving it across the side that matters most."""
     waiting, cells = [box], 0
     while waiting:

@@ -12,7 +12,7 @@ _INF = math.inf
 _FAR = _UNIT << 900  # no end has more digits, whatever powers a file has; floats go so far
 
 
-def _product(a: Any, b: Any) -> Any:
+def _product(a: int, b: int) -> Any:
     """Return a b, where an end at 0 wins over one without bound."""
     if not a or not b:
         return 0
@@ -87,7 +87,9 @@ class Interval:
             high = high * Interval(base.high, base.high)
         return Interval(low.low, high.high)
 
-    def monotone(self, function: Callable[[int], Interval], below: Any, above: Any) -> Interval:
+    def monotone(
+        self, function: Callable[[int], Interval], below: object, above: object
+    ) -> Interval:
         """Return a rising function of all, with its limits where there is no end."""
         low = below if self.low == -_INF else function(self.low).low
         return Interval(low, above if self.high == _INF else function(self.high).high)

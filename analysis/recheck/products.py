@@ -51,26 +51,26 @@ def _function(operation: str, *arguments: SumOfProducts) -> SumOfProducts:
 def multiplied_out(equation: WrittenEquation) -> SumOfProducts:
     """Return an equation as a sum of products of symbols and functions of sums."""
     sums: list[SumOfProducts] = []
-    for operation, *given in equation.nodes:
+    for operation, *operands in equation.nodes:
         if operation == "number":
-            sums.append(plus({}, NO_SYMBOLS, read_rational(given[0])))
+            sums.append(plus({}, NO_SYMBOLS, read_rational(operands[0])))
         elif operation == "symbol":
-            sums.append(one_symbol(given[0]))
+            sums.append(one_symbol(operands[0]))
         elif operation == "power":
             power = NO_SYMBOLS
-            for _ in range(given[1]):
-                power = _times(power, sums[given[0]])
+            for _ in range(operands[1]):
+                power = _times(power, sums[operands[0]])
             sums.append(power)
         elif operation == "+":
-            sums.append(plus(sums[given[0]], sums[given[1]], Fraction(1)))
+            sums.append(plus(sums[operands[0]], sums[operands[1]], Fraction(1)))
         elif operation == "*":
-            sums.append(_times(sums[given[0]], sums[given[1]]))
-        elif operation == "/" and sums[given[1]].keys() == {()}:
-            sums.append(plus({}, sums[given[0]], 1 / sums[given[1]][()]))
+            sums.append(_times(sums[operands[0]], sums[operands[1]]))
+        elif operation == "/" and sums[operands[1]].keys() == {()}:
+            sums.append(plus({}, sums[operands[0]], 1 / sums[operands[1]][()]))
         elif operation == "/":
-            sums.append(_times(sums[given[0]], _function("/", sums[given[1]])))
+            sums.append(_times(sums[operands[0]], _function("/", sums[operands[1]])))
         else:
-            sums.append(_function(operation, *(sums[i] for i in given)))
+            sums.append(_function(operation, *(sums[i] for i in operands)))
     return sums[-1]
 
 
@@ -78,7 +78,7 @@ def as_equation(total: Mapping[tuple[Any, ...], Fraction]) -> WrittenEquation:
     """Return a sum of products as an equation."""
     nodes: list[list[Any]] = []
 
-    def add(*node: Any) -> int:
+    def add(*node: object) -> int:
         nodes.append(list(node))
         return len(nodes) - 1
 

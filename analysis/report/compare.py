@@ -28,7 +28,7 @@ class Difference:
 
     where: str
     first: Any
-    second: Any
+    second: object
 
     def __str__(self) -> str:
         return f"{self.where}: {self.first} -> {self.second}"
@@ -187,7 +187,7 @@ def _names(texts: Sequence[str]) -> list[str]:
     return names
 
 
-def _same(a: Any, b: Any, rtol: float) -> bool:
+def _same(a: object, b: object, rtol: float) -> bool:
     """Whether two values say the same; numbers in text count as numbers."""
     if a == b and type(a) is type(b):
         return True

@@ -55,15 +55,15 @@ def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:
     if length <= count:
         return np.arange(length)
     finite = np.isfinite(signals)
-    kept = {*np.linspace(0, length - 1, count // 2).round().astype(int).tolist()}
+    chosen = {*np.linspace(0, length - 1, count // 2).round().astype(int).tolist()}
     stretches = max(1, count // 2 // (3 * max(1, number)))
-    for places in np.array_split(np.arange(length), stretches):
-        part, known = signals[:, places], finite[:, places]
-        lowest = np.where(known, part, np.inf).argmin(axis=1)
-        highest = np.where(known, part, -np.inf).argmax(axis=1)
-        for indices in (lowest, highest, known.argmin(axis=1)):
-            kept |= {*places[indices].tolist()}
-    return np.array(sorted(kept))
+    for stretch in np.array_split(np.arange(length), stretches):
+        part, is_number = signals[:, stretch], finite[:, stretch]
+        lowest = np.where(is_number, part, np.inf).argmin(axis=1)
+        highest = np.where(is_number, part, -np.inf).argmax(axis=1)
+        for indices in (lowest, highest, is_number.argmin(axis=1)):
+            chosen |= {*stretch[indices].tolist()}
+    return np.array(sorted(chosen))
 
 
 def _rounded(samples: np.ndarray) -> list[float | None]:

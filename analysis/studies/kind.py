@@ -115,11 +115,11 @@ class Ground(Setup):
         return replace(whole, quantities=tuple(by_name[name] for name in names), choices=())
 
 
-def _nothing(asked: Any, setup: Setup) -> int:
+def _nothing(asked: object, setup: Setup) -> int:
     return 0
 
 
-def _no_items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _no_items(finding: Finding, result: Result, asked: object, key: str) -> Iterator[Item]:
     yield from ()
 
 
@@ -244,7 +244,7 @@ class Kind:
                     f"'{key}' (kind '{self.name}')"
                 )
 
-    def planned(self, asked: Any, setup: Setup) -> int:
+    def planned(self, asked: object, setup: Setup) -> int:
         """Return how many simulations an analysis makes itself, at most.
 
         Parameters

@@ -96,7 +96,7 @@ def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
         raise RunFolderError(f"{what} holds what no run writes ({reason}): {remedy}") from error
 
 
-def digest_of(content: Any) -> str:
+def digest_of(content: object) -> str:
     """Return a key of what `as_json` has returned."""
     text = json.dumps(content, sort_keys=True, ensure_ascii=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()

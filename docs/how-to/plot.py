@@ -35,7 +35,7 @@ drawn.axes[0, 0].set_title("An own title")
 # With arguments of ``ct.time_response_plot`` it is python-control's plot. States go by their names, also in a table.
 drawn = run.plot(overlay_signals=True)
 zeta = run.states["controller.law.zeta"]
-assert np.array_equal(zeta, run.outputs[loop.output_index["zeta"]])
+assert np.array_equal(zeta, run.outputs["zeta"])
 print(run.to_pandas().shape)
 
 # %%

@@ -26,7 +26,7 @@ print(response)
 
 # %%
 # Outputs are found by their names.
-y, yd, u = (response.outputs[loop.output_index[name]] for name in ("y", "yd", "u"))
+y, yd, u = (response.outputs[name] for name in ("y", "yd", "u"))
 figure, (above, below) = plt.subplots(2, sharex=True, figsize=(6, 4))
 above.plot(t, yd, "--", label="reference")
 above.plot(t, y, label="output")

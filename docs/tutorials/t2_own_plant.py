@@ -30,7 +30,7 @@ loop = nlctl.interconnect(
 )
 t = np.linspace(0, 20, 2001)
 response = nlctl.input_output_response(loop, t, X0=nlctl.initial_state(loop, {"plant.x1": 0.8}))
-e = response.outputs[loop.output_index["e"]]
+e = response.outputs["e"]
 plt.figure(figsize=(6, 2.5))
 plt.plot(t, e)
 plt.xlabel("t (s)")

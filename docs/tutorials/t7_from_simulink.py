@@ -26,7 +26,7 @@ sample time, rate transition    ``nlctl.sampled(controller, dt)``
 accelerator mode                always: machine code; ``engine="python-control"`` interprets
 ``sim`` with many inputs        ``nlctl.ensemble_response``
 algebraic loop                  an error that prints its signals, or ``algebraic_loops="solve"``
-scope                           ``response.outputs[loop.output_index["y"]]``, or ``nlctl simulate --plot``
+scope                           ``response.outputs["y"]``, or ``nlctl simulate --plot``
 ==============================  ==================================================================================
 
 As an example, the textbook model of a servo: a PI controller, a saturation, and a motor :math:`1/(s (s + 1))`.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 
 from ..annotations import as_annotated
@@ -43,7 +41,7 @@ class FixedGainLaw:
 
 
 @as_annotated
-def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.InterconnectedSystem:
+def replaced(controller: ct.InterconnectedSystem, **pieces: object) -> ct.InterconnectedSystem:
     """Return a controller like this one, with other pieces in some places.
 
     Parameters

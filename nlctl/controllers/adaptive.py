@@ -53,11 +53,11 @@ class Zero:
 def adaptive_neural(
     order: int = 2,
     *,
-    filtered_error: Any = None,
-    basis: Any = None,
-    weights: Any = None,
-    robust: Any = None,
-    law: Any = None,
+    filtered_error: object = None,
+    basis: object = None,
+    weights: object = None,
+    robust: object = None,
+    law: object = None,
     name: str = "controller",
 ) -> ct.InterconnectedSystem:
     """Connect the adaptive neural controller of the paper, (14) and (23)-(25).

@@ -148,7 +148,7 @@ class TransportDelay:
         return values
 
     @staticmethod
-    def output(t: float, x: Any, u: Any, p: Any) -> Any:
+    def output(t: float, x: object, u: object, p: object) -> Any:
         """Not a function of the present: only a run knows it."""
         raise UsageError(
             "a TransportDelay has no output that follows from the present: "

@@ -56,8 +56,8 @@ def _check_not_compiled(thing: object, name: str) -> None:
 def interconnect(
     blocks: Mapping[str, Any] | Sequence[ct.InputOutputSystem],
     connections: Sequence[Any] | None = None,
-    inplist: Any = None,
-    outlist: Any = None,
+    inplist: object = None,
+    outlist: object = None,
     params: Mapping[str, Any] | None = None,
     *,
     inputs: Sequence[str] = (),
@@ -160,7 +160,9 @@ def _by_name(systems: Sequence[Any], inputs: Sequence[str]) -> Callable[..., Any
     _check_inputs(systems, sources, inputs)
     _check_orders(systems, sources)
 
-    def connected(systems: Any, inputs: Any, outputs: Any, name: str | None) -> Any:
+    def connected(
+        systems: Any, inputs: Sequence[str], outputs: Sequence[str], name: str | None
+    ) -> Any:
         outputs = list(sources) if outputs is None else list(outputs)
         for signal in outputs:
             if signal not in sources:
@@ -178,7 +180,7 @@ def _by_name(systems: Sequence[Any], inputs: Sequence[str]) -> Callable[..., Any
     return connected
 
 
-def _connected(systems: Sequence[Any], *lists: Any, **more: Any) -> Any:
+def _connected(systems: Sequence[Any], *lists: Any, **more: object) -> Any:
     """Return what `control.interconnect` makes, of linear blocks alone without inputs, too."""
     # Of these python-control makes a linear system, but takes a matrix with one row and no column
     # for one without rows.  What it makes where one block is not linear is right.
@@ -197,7 +199,7 @@ def _connected(systems: Sequence[Any], *lists: Any, **more: Any) -> Any:
     return ct.LinearICSystem(diagram, None) if is_right else diagram
 
 
-def _with_values(diagram: Any, params: Mapping[str, Any] | None) -> Any:
+def _with_values(diagram: ct.InterconnectedSystem, params: Mapping[str, Any] | None) -> Any:
     """Let a diagram's parameters have values of its own."""
     if params:
         overridden(diagram, params)  # refuses names and values
@@ -245,7 +247,7 @@ def _check_timebases(systems: Sequence[Any]) -> None:
             ) from None
 
 
-def _timebase(dt: Any) -> str:
+def _timebase(dt: object) -> str:
     return f"is in discrete time (dt = {dt})" if dt else "is in continuous time"
 
 
@@ -282,7 +284,8 @@ def _check_inputs(
             if signal not in sources and signal not in inputs:
                 error = unknown("signal", signal, [*sources, *inputs])
                 raise DiagramError(
-                    f"block '{system.name}' takes a signal that no block outputs: {error}"
+                    f"block '{system.name}' takes a signal that no block outputs: {error}; "
+                    f"what comes from outside is an input of the diagram: inputs=['{signal}']"
                 )
 
 
@@ -304,7 +307,9 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
                 )
 
 
-def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.InterconnectedSystem:
+def reconnected(
+    before: Any, parts: Sequence[Any], maps: Any, dt: object
+) -> ct.InterconnectedSystem:
     """Return parts connected by maps, to replace a diagram: with its signals and parameters."""
     diagram = ct.InterconnectedSystem(
         parts,
@@ -338,7 +343,7 @@ def _state_labels(before: Any, parts: Sequence[Any]) -> list[str]:
 
 
 def connected_by_lists(
-    systems: Sequence[Any], connections: Any, inplist: Any, outlist: Any
+    systems: Sequence[Any], connections: object, inplist: object, outlist: object
 ) -> Callable[..., Any]:
     """Check the names in lists of python-control; return what connects blocks by them."""
     # That takes ``(systems, inputs, outputs, name)`` and returns the diagram; it refuses what
@@ -347,7 +352,7 @@ def connected_by_lists(
         for text in _texts(what):
             _check_name(systems, text)
 
-    def connected(systems: Any, inputs: Any, outputs: Any, name: str | None) -> Any:
+    def connected(systems: Any, inputs: object, outputs: object, name: str | None) -> Any:
         given = outlist
         if outlist is None and outputs is None:
             every = [(s, label) for s in systems for label in s.output_labels]
@@ -367,7 +372,7 @@ def connected_by_lists(
     return connected
 
 
-def _texts(thing: Any) -> Iterator[str]:
+def _texts(thing: object) -> Iterator[str]:
     """Yield all texts in nested lists; python-control checks tuples of numbers and gains."""
     if isinstance(thing, str):
         yield thing
@@ -398,7 +403,7 @@ def _is_there(signal: str, labels: Any) -> bool:
     return signal in labels or any(label.partition("[")[0] == base for label in labels)
 
 
-def _check_fed(diagram: Any) -> None:
+def _check_fed(diagram: ct.InterconnectedSystem) -> None:
     """Refuse an input of a block that nothing feeds: python-control takes it for 0."""
     dropped, _ = diagram.check_unused_signals(print_warning=False)
     for number, signal in sorted(dropped):

@@ -28,7 +28,7 @@ def check_read(system: System, params: Mapping[str, Any] | None) -> None:
     divided(system, params)
 
 
-def override(system: Any, params: Mapping[str, Any] | None) -> dict[str, Any]:
+def override(system: ct.NonlinearIOSystem, params: Mapping[str, Any] | None) -> dict[str, Any]:
     """Let a system's equations have a user's overrides from now on; None for its own values."""
     parts = divided(system, params)
     blocks = [within(leaf.system) for leaf in leaves(system)]
@@ -76,8 +76,9 @@ def parameter_names(system: ct.InputOutputSystem) -> list[str]:
 def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     """Return the parameter table of a diagram, with the values of a run without overrides."""
     if isinstance(system, ct.NonlinearIOSystem):
-        system = apart(system).system
-        set_parameters(system, None)
+        named = apart(system).system
+        set_parameters(named, None)
+        system = named
     rows: list[ParameterRow] = []
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block):
@@ -89,7 +90,7 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     return rows
 
 
-def declared_rules(system: Any) -> dict[str, Param]:
+def declared_rules(system: ct.NonlinearIOSystem) -> dict[str, Param]:
     """Return what records declare of parameters, by qualified names."""
     owners = [(leaf.parameter_path, within(leaf.system)) for leaf in leaves(system)]
     specs = [(path, block.spec) for path, block in owners if isinstance(block, Block)]

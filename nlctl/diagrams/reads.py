@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from types import CodeType, FunctionType, MethodType
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from ..upstream.control_internals import current_parameters
@@ -18,7 +19,7 @@ _VALUES = (0.0, 0.25, 1.0)  # of states and inputs at which it is called
 _CONTAINERS = (tuple, list, set, frozenset)
 
 
-def may_read(block: Any, key: str) -> bool:
+def may_read(block: ct.NonlinearIOSystem, key: str) -> bool:
     """Whether the functions of a third-party block may read a parameter of that name."""
     functions = [f for f in (block.updfcn, block.outfcn) if f is not None]
     if key in declared_keys(block) or any(key in texts_of(f) for f in functions):
@@ -26,7 +27,7 @@ def may_read(block: Any, key: str) -> bool:
     return any(_reads(f, block, key) for f in functions)
 
 
-def texts_of(function: Any) -> frozenset[str]:
+def texts_of(function: object) -> frozenset[str]:
     """Return all text constants that a function reaches: in code, in what it reads around it."""
     texts: set[str] = set()
     waiting, seen = [function], set()
@@ -40,23 +41,23 @@ def texts_of(function: Any) -> frozenset[str]:
     return frozenset(texts)
 
 
-def _reached(thing: object) -> Iterator[Any]:
+def _reached(member: object) -> Iterator[Any]:
     """Yield what one thing leads to."""
-    if isinstance(thing, CodeType):
-        yield from thing.co_consts
-    elif isinstance(thing, FunctionType):
-        yield from _of_function(thing)
-    elif isinstance(thing, MethodType):
-        yield from (thing.__func__, thing.__self__)
-    elif isinstance(thing, functools.partial):
-        yield from (thing.func, *thing.args, *thing.keywords.values())
-    elif isinstance(thing, _CONTAINERS):
-        yield from thing
-    elif isinstance(thing, dict):
-        yield from (*thing, *thing.values())
-    elif _is_users(thing):
-        yield from vars(thing).values()
-        for kind in type(thing).__mro__[:-1]:
+    if isinstance(member, CodeType):
+        yield from member.co_consts
+    elif isinstance(member, FunctionType):
+        yield from _of_function(member)
+    elif isinstance(member, MethodType):
+        yield from (member.__func__, member.__self__)
+    elif isinstance(member, functools.partial):
+        yield from (member.func, *member.args, *member.keywords.values())
+    elif isinstance(member, _CONTAINERS):
+        yield from member
+    elif isinstance(member, dict):
+        yield from (*member, *member.values())
+    elif _is_users(member):
+        yield from vars(member).values()
+        for kind in type(member).__mro__[:-1]:
             yield from (f for f in vars(kind).values() if isinstance(f, FunctionType | str))
 
 
@@ -101,7 +102,7 @@ def _noting(name: str, *, one: bool) -> Callable[..., Any]:
     """Return a method of a dict that notes which key it is asked for, or that it is all."""
     method = getattr(dict, name)
 
-    def noted(self: _Watched, *given: Any) -> Any:
+    def noted(self: _Watched, *given: object) -> Any:
         self.asked.update(given[:1] if one else ())
         self.every |= not one
         return method(self, *given)
@@ -115,7 +116,7 @@ for _name in ("__iter__", "keys", "values", "items", "copy", "__or__", "__ror__"
     setattr(_Watched, _name, _noting(_name, one=False))
 
 
-def _reads(function: Any, block: System, key: str) -> bool:
+def _reads(function: Callable[..., Any], block: System, key: str) -> bool:
     """Whether a function asks for a name that is not in its code, where it is called."""
     called = False
     for value in _VALUES:

@@ -39,7 +39,7 @@ def is_third_party(system: System) -> bool:
     return is_nonlinear and not isinstance(system, Block) and takes_a_dict(system)
 
 
-def declared_keys(block: Any) -> list[str]:
+def declared_keys(block: ct.NonlinearIOSystem) -> list[str]:
     """Return the parameters that a third-party block declares, by the names that it reads."""
     return list(block.nlctl_own if isinstance(block, Named) else block.params)
 
@@ -128,7 +128,7 @@ def with_own_values(system: Any) -> Any:
     return _named(system, given)
 
 
-def _lacks_own(block: Any) -> bool:
+def _lacks_own(block: ct.NonlinearIOSystem) -> bool:
     if not is_third_party(block) or isinstance(block, Named) or "params" not in vars(block):
         return False
     return bool(block.params) and all(isinstance(k, str) and "." not in k for k in block.params)
@@ -153,7 +153,7 @@ def _named(system: Any, given: Apart) -> Any:
     return around
 
 
-def _named_diagram(diagram: Any, parts: list[Any]) -> Any:
+def _named_diagram(diagram: ct.InterconnectedSystem, parts: list[Any]) -> Any:
     """Return a diagram of other parts, with the values that its parameters have."""
     if all(new is old for new, old in zip(parts, diagram.syslist, strict=True)):
         return diagram
@@ -198,7 +198,7 @@ class Apart:
             self.connect(old, new)
         return True
 
-    def connect(self, old: Any, new: Any) -> None:
+    def connect(self, old: object, new: ct.NonlinearIOSystem) -> None:
         """Give a diagram's copy the parameters of the diagram, of the copies of its blocks."""
         params = getattr(old, "params", None)
         if not isinstance(old, ct.InterconnectedSystem) or not isinstance(params, Parameters):
@@ -235,7 +235,7 @@ def apart(system: System) -> Apart:
     return copies
 
 
-def own_attributes(old: Any) -> set[str]:
+def own_attributes(old: ct.NonlinearIOSystem) -> set[str]:
     """Return the attributes that a copy has of its own."""
     kept = {*RESOLVED, "nlctl_overrides"}
     if isinstance(old, Block):

@@ -297,7 +297,7 @@ class Drawing(Figure):
     The same drawing gives the same bytes, so that notebooks under version control stay quiet.
     """
 
-    def set_layout_engine(self, layout: Any = None, **kwargs: Any) -> None:
+    def set_layout_engine(self, layout: object = None, **kwargs: object) -> None:
         """Choose how axes are arranged; everything has its place, so by default not at all."""
         # Matplotlib restores "none" as None behind a save, and takes that from its settings.
         chosen = cast(Any, "none" if layout is None else layout)

@@ -91,7 +91,7 @@ def export_controller(
         )
     values, start = parameter_values(compiled, p), state_of(alone, initial_state)
     return ExportedController(
-        name=c_name(block.replace(".", "_") if name is None else name), dt=clock.dt,
+        name=c_name(name, block), dt=clock.dt,
         offset=clock.offset, inputs=tuple(part.input_labels), outputs=tuple(part.output_labels),
         states=tuple(part.state_labels or ()), parameters=values, initial_state=start,
         takes_time=_reads_time(lowered), lowered=lowered,
@@ -100,7 +100,7 @@ def export_controller(
     )  # fmt: skip
 
 
-def _block_of(diagram: Any, path: str) -> Any:
+def _block_of(diagram: ct.InterconnectedSystem, path: str) -> Any:
     """Return the block or inner diagram of a dotted name."""
     inner = diagram
     for i, part in enumerate(path.split(".")):
@@ -112,7 +112,7 @@ def _block_of(diagram: Any, path: str) -> Any:
     return inner
 
 
-def _sampled_part(part: Any, dt: float | None, method: str | None) -> Any:
+def _sampled_part(part: ct.NonlinearIOSystem, dt: float | None, method: str | None) -> Any:
     """Return a block whose leaves are all sampled."""
     is_sampled = {
         leaf.path or leaf.system.name: isinstance(leaf.system, Sampled) for leaf in leaves(part)
@@ -132,7 +132,7 @@ def _sampled_part(part: Any, dt: float | None, method: str | None) -> Any:
     return sampled(part, number("export_controller", "dt", dt, above=0), method=method)
 
 
-def _alone(part: Any) -> ct.InterconnectedSystem:
+def _alone(part: ct.NonlinearIOSystem) -> ct.InterconnectedSystem:
     """Return a diagram of one block, with its inputs and outputs."""
     inputs, outputs = list(part.input_labels), list(part.output_labels)
     return ct.interconnect(
@@ -161,7 +161,10 @@ def _clock_of(compiled: native.Compiled, block: str) -> Any:
 
 
 def _parameters_of(
-    part: Any, block: str, diagram: Any, params: Mapping[str, Any]
+    part: ct.NonlinearIOSystem,
+    block: str,
+    diagram: ct.InterconnectedSystem,
+    params: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the parameters of a loop and those given, as far as they are the block's."""
     inside = f"{part.name}."

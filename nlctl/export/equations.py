@@ -63,7 +63,7 @@ def export_equations(
     values, start = parameter_values(compiled, p), state_of(diagram, initial_state)
     labels, lowered = tuple(compiled.state_labels or ()), compiled.lowered
     return ExportedEquations(
-        name=c_name(what if name is None else name), inputs=tuple(diagram.input_labels or ()),
+        name=c_name(name, what), inputs=tuple(diagram.input_labels or ()),
         outputs=tuple(diagram.output_labels or ()), states=labels,
         memory=tuple(labels[i] for i in compiled.program.memory), conditions=lowered.rows["g"],
         parameters=values, initial_state=start, lowered=lowered,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -20,8 +19,9 @@ _RESERVED = re.compile(
 )
 
 
-def c_name(name: str) -> str:
-    """Return a name, checked to be one in C."""
+def c_name(name: str | None, label: str) -> str:
+    """Return a name, checked to be one in C; without one that of a block or diagram."""
+    name = re.sub(r"\W", "_", label, flags=re.ASCII) if name is None else name
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or _RESERVED.fullmatch(name):
         raise ParameterError(f"'{name}' is not a name in C: give name= of letters, digits and '_'")
     return name
@@ -81,7 +81,7 @@ def refuse_if_any(what: str, reasons: Mapping[str, bool], purpose: str = "be exp
             raise CompileError(f"'{what}' cannot {purpose}: it {reason}")
 
 
-def digest(text: str, parameters: Mapping[str, float], start: np.ndarray, more: Any = ()) -> str:
+def digest(text: str, parameters: Mapping[str, float], start: np.ndarray, more: object = ()) -> str:
     """Return a key of a program and its numbers."""
     content = repr((text, list(parameters.items()), start.tolist(), more))
     return hashlib.sha256(content.encode()).hexdigest()[:16]

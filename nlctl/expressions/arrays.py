@@ -34,7 +34,7 @@ class Computed(Special):
 
 
 def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
-    def method(self: Computed, *other: Any) -> Any:
+    def method(self: Computed, *other: object) -> Any:
         if self.graph.attempts and name == "div":
             raise Untraceable("try around a division of complex numbers")
         return self.operation(self.graph, name, (*other, self) if reflected else (self, *other))
@@ -167,7 +167,7 @@ class Tracer:
         origin = self.origin or ((self, self.version) if self.axis is not None else None)
         return Tracer(self.graph, cells, axis, length, origin, place)
 
-    def _text(self, *_: Any) -> str:
+    def _text(self, *_: object) -> str:
         raise Untraceable("a text of what is only known when it runs")
 
     __str__ = __repr__ = __format__ = _text
@@ -300,7 +300,7 @@ class Tracer:
         return self.cells.reshape(-1)[0]
 
 
-def as_array(cells: Any) -> np.ndarray:
+def as_array(cells: object) -> np.ndarray:
     """Return cells as an array; NumPy hands out a single element as it is."""
     if isinstance(cells, np.ndarray):
         return cells

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .arithmetic import Arithmetic
+
 
 @dataclass(frozen=True, kw_only=True)
 class RealFunction:
@@ -42,11 +44,11 @@ class RealFunction:
         return len(self.derivative)
 
 
-def _zero(*x: Any) -> Any:
+def _zero(*x: Arithmetic) -> Any:
     return 0.0 * x[0]  # NaN stays
 
 
-def _log_of(base: float, x: Any) -> Any:
+def _log_of(base: float, x: Arithmetic) -> Any:
     return np.log(base + 0.0 * x)  # as exact as x: a ball encloses it
 
 

@@ -204,7 +204,7 @@ class Graph:
         self,
         op: str,
         *args: Expr,
-        data: Any = None,
+        data: object = None,
         size: int | None = None,
         kind: str = "f",
         varies: bool = False,

@@ -125,7 +125,7 @@ def _masked(self: Tracer, mask: Tracer, value: Any) -> None:
     _assign(self, ..., chosen)
 
 
-def _assign(self: Tracer, key: Any, value: Any) -> None:
+def _assign(self: Tracer, key: Any, value: object) -> None:
     """Assign to items; what is assigned to a part of a long array goes into that."""
     key = _settled(key)
     if _is_mask(key):

@@ -59,7 +59,7 @@ class Masked(Computed):
 
     size = property(count)
 
-    def _text(self, *_: Any) -> Any:
+    def _text(self, *_: object) -> Any:
         raise Untraceable("elements that a mask chooses, whose number only the run knows")
 
     def __iter__(self) -> Iterator[Any]:
@@ -87,7 +87,7 @@ class MaskedPlaces(Special):
         return (k for k in range(len(self.mask)) if self.mask[k])
 
 
-def _power(self: Masked, exponent: Any) -> Masked:
+def _power(self: Masked, exponent: object) -> Masked:
     if isinstance(exponent, Tracer | np.ndarray) and exponent.ndim:
         raise Untraceable("an array next to elements that a mask chooses")
     return Masked(self.whole**exponent, self.mask)  # type: ignore[operator]

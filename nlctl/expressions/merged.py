@@ -211,7 +211,7 @@ def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
-def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+def _choices(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return what either branch assigns, by a condition that is not known; None if it is."""
     condition = _open(graph, test)
     if condition is None:
@@ -226,7 +226,7 @@ def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], A
         return None
 
 
-def _choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return ``yes() if test else no()``."""
     both = _choices(graph, test, lambda: (yes(),), lambda: (no(),))
     if both is None:
@@ -234,7 +234,7 @@ def _choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], An
     return both[0]
 
 
-def _fails(graph: Graph, test: Any) -> Any:
+def _fails(graph: Graph, test: object) -> Any:
     """Return whether an error is raised, False where that is only known when it runs."""
     condition = _open(graph, test)
     if condition is None or graph.attempts:
@@ -251,7 +251,7 @@ def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
     return value
 
 
-def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
+def _with(graph: Graph, kind: str, value: object, part: Callable[[], Any]) -> Any:
     ask = lambda: (truth_value(graph, part()),)  # noqa: E731
     if kind == "and":
         both = _choices(graph, value, ask, lambda: (False,))
@@ -260,19 +260,19 @@ def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
     return either[0] if either else value or part()
 
 
-def _opposite(graph: Graph, value: Any) -> Any:
+def _opposite(graph: Graph, value: object) -> Any:
     """Return ``not value``."""
     condition = _open(graph, value)
     return not value if condition is None else elementwise(graph, "not", truth_value(graph, value))
 
 
-def truth_value(graph: Graph, value: Any) -> Any:
+def truth_value(graph: Graph, value: object) -> Any:
     """Return the truth of a number."""
     number = traced(graph, value)
     return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
 
 
-def _open(graph: Graph, test: Any) -> Expr | None:
+def _open(graph: Graph, test: object) -> Expr | None:
     """Return a condition that is not known, and not decided on this path."""
     if not isinstance(test, Tracer) or test.shape:
         return None
@@ -291,7 +291,7 @@ def _under(graph: Graph, condition: Expr, holds: bool, branch: Callable[[], Any]
     return values
 
 
-def chosen(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
+def chosen(graph: Graph, condition: Expr, one: object, other: object) -> Tracer:
     """Return one number or array where a condition holds, another elsewhere."""
     a, b = traced(graph, one), traced(graph, other)
     kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()

@@ -14,7 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Special, Tracer, as_array, is_complex, mapped, python_number, scalar, traced
+from .arrays import (
+    Special,
+    Tracer,
+    as_array,
+    is_complex,
+    mapped,
+    python_number,
+    scalar,
+    traced,
+)
 from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable, needed
 
 _Range = tuple[float, float]
@@ -78,7 +87,7 @@ _RULES = {
 _FOLLOWED = 16  # values of an integer, each a way through a function
 
 
-def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
+def elementwise(graph: Graph, name: str, *operands: object) -> Tracer:
     """Return an operation on arrays, element by element, with NumPy's broadcasting."""
     special = next((v for v in operands if isinstance(v, Special)), None)
     if special is None and Special.of_complex and any(map(is_complex, operands)):
@@ -150,7 +159,7 @@ def product(a: Tracer, b: Tracer) -> Tracer:
     return total(elementwise(a.graph, "mul", a, b), -1)
 
 
-def _matrix_product(graph: Graph, a: Any, b: Any) -> Any:
+def _matrix_product(graph: Graph, a: object, b: object) -> Any:
     if is_complex(a) or is_complex(b):
         assert Special.of_complex is not None
         return Special.of_complex(graph, a) @ b
@@ -230,7 +239,7 @@ def _floor_division_by(self: Tracer, other: object) -> Any:
     return floor_quotient(self.graph, other, self)
 
 
-def floor_quotient(graph: Graph, a: Any, b: Any) -> Tracer:
+def floor_quotient(graph: Graph, a: object, b: object) -> Tracer:
     """Return NumPy's floor_divide of floats, which starts from the exact remainder."""
     both = [traced(graph, v) for v in (a, b)]
     if all(e.kind == "i" for array in both for e in array.values.flat):
@@ -298,11 +307,11 @@ def _as_their_result(result: Any, operands: Sequence[Any]) -> Any:
     return python_number(result.graph, result.only)
 
 
-def _is_pythons(value: Any) -> bool:
+def _is_pythons(value: object) -> bool:
     return value.is_pythons if isinstance(value, Tracer) else type(value) in (float, int, bool)
 
 
-def _ask_divisor(graph: Graph, a: Any, b: Any) -> None:
+def _ask_divisor(graph: Graph, a: object, b: object) -> None:
     """Follow the error of Python's own division by zero, of which NumPy's knows none."""
     frame = sys._getframe(1)
     while frame.f_globals is globals() and frame.f_back is not None:
@@ -315,7 +324,7 @@ def _ask_divisor(graph: Graph, a: Any, b: Any) -> None:
         raise Untraceable("try around a division of what may be Python's own numbers")
 
 
-def _is_numpys(graph: Graph, value: Any) -> bool:
+def _is_numpys(graph: Graph, value: object) -> bool:
     """Whether a number is known to be one of NumPy's: it is made of states or inputs."""
     if not isinstance(value, Tracer) or value.shape:
         return isinstance(value, Tracer | np.ndarray | np.generic)

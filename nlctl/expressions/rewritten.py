@@ -244,7 +244,7 @@ class _Unwritten:
     def __class__(self) -> Any:
         return str
 
-    def _asked(self, *_: Any) -> Any:
+    def _asked(self, *_: object) -> Any:
         raise Untraceable("a text of what is only known when it runs")
 
     __getattr__ = __str__ = __format__ = __hash__ = __eq__ = __len__ = __bool__ = _asked
@@ -261,7 +261,7 @@ class _Attempt:
     def __enter__(self) -> None:
         self.graph.attempts += 1
 
-    def __exit__(self, kind: Any, error: BaseException | None, *_: object) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, *_: object) -> None:
         self.graph.attempts -= 1
         if isinstance(error, Exception) and not is_raised(error):
             raise Unfollowed from error
@@ -291,7 +291,7 @@ def is_raised(error: BaseException) -> bool:
     return is_staged and (raises or isinstance(error, _PYTHONS))
 
 
-def _item(graph: Graph, whole: Any, key: Any) -> Any:
+def _item(graph: Graph, whole: Any, key: object) -> Any:
     """Return what Python finds at a key; of NumPy's integers what expressions choose."""
     keys = key if isinstance(key, tuple) else (key,)
     if not any(isinstance(k, Tracer) for k in keys):
@@ -300,7 +300,7 @@ def _item(graph: Graph, whole: Any, key: Any) -> Any:
     return (traced(graph, whole) if of_floats or type(whole) is np.ndarray else whole)[key]
 
 
-def _is_float(value: Any) -> bool:
+def _is_float(value: object) -> bool:
     if isinstance(value, Tracer):
         return not value.shape and value.only.kind == "f"
     return type(value) is float
@@ -319,18 +319,18 @@ def _index(whole: Any, value: Any) -> Any:
 class NumberKeys(dict[Any, Any]):
     """A dict of numbers: what it has for a key that is only known when it runs."""
 
-    def __getitem__(self, key: Any) -> Any:
+    def __getitem__(self, key: object) -> Any:
         if not isinstance(key, Tracer):
             return super().__getitem__(key)
         known = functools.reduce(lambda a, b: a | b, (_is_key(key, k) for k in self))
         key.graph.guard(known.only, KeyError)
         return self._chosen(key, next(reversed(self.values())))
 
-    def get(self, key: Any, default: Any = None) -> Any:
+    def get(self, key: object, default: object = None) -> Any:
         """Return what it has for a key, or a default."""
         return self._chosen(key, default) if isinstance(key, Tracer) else super().get(key, default)
 
-    def _chosen(self, key: Tracer, choice: Any) -> Any:
+    def _chosen(self, key: Tracer, choice: object) -> Any:
         numbers = all(isinstance(v, int | float | Tracer) for v in (*self.values(), choice))
         if key.shape or not numbers or not all(isinstance(k, _KEYS) for k in self):
             raise Untraceable("a key that is only known when it runs")
@@ -339,7 +339,7 @@ class NumberKeys(dict[Any, Any]):
         return choice
 
 
-def _is_key(key: Tracer, k: Any) -> Tracer:
+def _is_key(key: Tracer, k: object) -> Tracer:
     return elementwise(key.graph, "eq", key, k)
 
 

@@ -61,7 +61,7 @@ class Stage:
         self.cmath = staged.StagedModule(cmath, self._library)
         self._builtins = Builtins(self).namespace(self._import)
 
-    def copied(self, function: Any) -> Any:
+    def copied(self, function: object) -> Any:
         """Return a copy of a function whose global names and closure lead to the stage."""
         function = getattr(function, "py_func", function)
         if not isinstance(function, FunctionType):
@@ -107,7 +107,7 @@ class Stage:
     def _call_of_a_library(self, thing: Any) -> Any:
         of_numbers = self.for_numbers(thing)
 
-        def function(*arguments: Any, **options: Any) -> Any:
+        def function(*arguments: object, **options: object) -> Any:
             given = staged.settled(arguments)
             if not staged.holds_tracers([*given, *options.values()]):
                 return of_numbers(*given, **options)
@@ -214,14 +214,14 @@ class Stage:
             raise Untraceable("np.vectorize with other arguments")
         return WRITTEN[np.vectorize](self.graph, self.instead(value.pyfunc), value.otypes)
 
-    def _dispatched(self, function: Any, first: Any, *rest: Any, **options: Any) -> Any:
+    def _dispatched(self, function: Any, first: Any, *rest: object, **options: object) -> Any:
         """Return what a function returns that the type of its first argument chooses."""
         functions = set(map(function.dispatch, self._kinds(first)))
         if len(functions) > 1:
             raise Untraceable("a choice by the type of a number")
         return self.copied(functions.pop())(first, *rest, **options)
 
-    def _kinds(self, value: Any) -> list[type]:
+    def _kinds(self, value: object) -> list[type]:
         """Return the types that a value may have."""
         if isinstance(value, Tracer):
             return (
@@ -239,7 +239,7 @@ class Stage:
 
     # -- libraries ---------------------------------------------------------------------------------
 
-    def _library(self, name: str, real: Any) -> Any:
+    def _library(self, name: str, real: object) -> Any:
         """Return a function or module of a library: its own version here, or for constants."""
         if isinstance(real, ModuleType):
             return staged.StagedModule(real, self._library)
@@ -266,7 +266,7 @@ class Stage:
         written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
         folds = (getattr(real, "__module__", None) or "").startswith(_OF_MATRICES)
 
-        def function(*arguments: Any, **options: Any) -> Any:
+        def function(*arguments: object, **options: object) -> Any:
             given = [*staged.settled(arguments), *map(staged.settled, options.values())]
             if folds and not staged.holds_tracers(given):
                 return of_numbers(*arguments, **options)
@@ -280,7 +280,7 @@ class Stage:
     def for_numbers(self, real: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that takes constants, and refuses tracers."""
 
-        def function(*arguments: Any, **options: Any) -> Any:
+        def function(*arguments: object, **options: object) -> Any:
             every, named = (
                 staged.settled(arguments),
                 {k: staged.settled(v) for k, v in options.items()},
@@ -296,7 +296,9 @@ class Stage:
 
         return function
 
-    def _traced_library(self, real: Any, written: FunctionType, given: Any, named: Any) -> Any:
+    def _traced_library(
+        self, real: object, written: FunctionType, given: tuple[Any, ...], named: Any
+    ) -> Any:
         """Trace a function of a library that is plain Python as if it were somebody's."""
         try:
             return self.copied(written)(*given, **named)
@@ -321,7 +323,7 @@ class Stage:
         operation, of_numbers = MATH[name], self.for_numbers(real)
         count = numpy_function(operation).nin
 
-        def function(*arguments: Any) -> Any:
+        def function(*arguments: object) -> Any:
             if not staged.holds_tracers(arguments):
                 return of_numbers(*arguments)
             if len(arguments) != count:
@@ -334,12 +336,12 @@ class Stage:
 
         return function
 
-    def _of_python(self, function: Any) -> Any:
+    def _of_python(self, function: object) -> Any:
         """Return a function of math whose results are numbers of Python's own."""
         if not callable(function):
             return function
 
-        def of_python(*arguments: Any, **options: Any) -> Any:
+        def of_python(*arguments: object, **options: object) -> Any:
             result: Any = function(*arguments, **options)
             is_number = isinstance(result, Tracer) and not result.shape
             return python_number(self.graph, result.only) if is_number else result
@@ -380,7 +382,7 @@ class Stage:
                 setattr(copied, name, self._member(value))
         return self.classes[cls]
 
-    def _float64(self, value: Any = 0.0) -> Any:
+    def _float64(self, value: object = 0.0) -> Any:
         """Return a number as one of NumPy's."""
         of_floats: Any = self._builtins["float"]
         number = of_floats.make(value)
@@ -420,7 +422,7 @@ def _errstate(**how: Any) -> Any:
     return np.errstate(**how)
 
 
-def _suppress(*_: Any) -> Any:
+def _suppress(*_: object) -> Any:
     """Refuse what the words of a function do not show."""
     raise Untraceable("contextlib.suppress under a name that is not global")
 
@@ -435,7 +437,7 @@ def _has_code(value: object) -> bool:
     return isinstance(value, FunctionType | staticmethod | classmethod | property)
 
 
-def _title(real: Any) -> str:
+def _title(real: object) -> str:
     """Return a function's name as it is written."""
     module = (getattr(real, "__module__", None) or "").replace("numpy", "np")
     name = getattr(real, "__qualname__", None) or getattr(real, "__name__", repr(real))

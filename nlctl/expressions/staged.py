@@ -37,7 +37,7 @@ class OnStage(Protocol):
     graph: Graph
     classes: dict[type, type]
 
-    def copied(self, function: Any) -> Any:
+    def copied(self, function: object) -> Any:
         """Return a copy of a function whose global names and closure lead to the stage."""
 
     def called_object(self, thing: object) -> Any:
@@ -80,7 +80,7 @@ def is_of_a_library(thing: object) -> bool:
 class StagedModule:
     """A module whose functions are replaced."""
 
-    def __init__(self, real: Any, function: Callable[[str, Any], Any]) -> None:
+    def __init__(self, real: object, function: Callable[[str, Any], Any]) -> None:
         self._real, self._function = real, function
 
     def __getattr__(self, name: str) -> Any:
@@ -94,7 +94,7 @@ class StagedModule:
 class Messages:
     """What writes messages: a trace that reaches one ends, unless its level is off."""
 
-    def __init__(self, real: Any) -> None:
+    def __init__(self, real: logging.Logger) -> None:
         self._real = real
 
     def __call__(self, *_: object, **__: object) -> None:
@@ -109,10 +109,10 @@ class Messages:
 class StagedType:
     """A class of a library: what it makes of constants is an object of the library."""
 
-    def __init__(self, real: Any, stage: OnStage) -> None:
+    def __init__(self, real: object, stage: OnStage) -> None:
         self.__dict__.update(_real=real, _stage=stage)
 
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
+    def __call__(self, *arguments: object, **options: object) -> Any:
         written, given = WRITTEN.get(self._real), [*arguments, *options.values()]
         if written is not None and (self._real is np.vectorize or holds_tracers(given)):
             return written(self._stage.graph, *arguments, **options)
@@ -135,7 +135,7 @@ class StagedObject:
     __hash__ = None  # type: ignore[assignment]
     _forwards = True
 
-    def __init__(self, real: Any, stage: OnStage) -> None:
+    def __init__(self, real: object, stage: OnStage) -> None:
         self.__dict__.update(_real=real, _stage=stage)
 
     def __getattr__(self, name: str) -> Any:
@@ -161,14 +161,14 @@ class StagedObject:
     def __setattr__(self, name: str, value: object) -> None:
         raise Untraceable("a function that changes an object")
 
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
+    def __call__(self, *arguments: object, **options: object) -> Any:
         return self._stage.called_object(self._real)(*arguments, **options)
 
 
 def _forwarded(name: str) -> Callable[..., Any]:
     """Return an operator of an object: its class's own, on the stage."""
 
-    def method(self: StagedObject, *rest: Any) -> Any:
+    def method(self: StagedObject, *rest: object) -> Any:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
         attribute = inspect.getattr_static(type(real), name, None)
         if isinstance(attribute, FunctionType) and not is_of_a_library(real):
@@ -230,7 +230,7 @@ _ACCUMULATING = {"add": np.cumsum, "multiply": np.cumprod}
 class Ufunc:
     """A function of NumPy or SciPy, element by element."""
 
-    def __init__(self, graph: Graph, real: Any, unwrapped: Callable[..., Any]) -> None:
+    def __init__(self, graph: Graph, real: np.ufunc, unwrapped: Callable[..., Any]) -> None:
         self.graph, self.real, self.plain = graph, real, unwrapped
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
@@ -257,7 +257,7 @@ class Ufunc:
             raise Untraceable(f"{self.real.__name__}.reduce with other arguments")
         return functools.reduce(self, list(traced(self.graph, values)))
 
-    def plain_method(self, name: str, *values: Any, **options: Any) -> Any:
+    def plain_method(self, name: str, *values: object, **options: object) -> Any:
         """Return what a method of NumPy's makes of constants."""
         return getattr(self.real, name)(*map(settled, values), **options)
 

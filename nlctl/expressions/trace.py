@@ -39,7 +39,7 @@ PATHS = 128  # paths through one function that are followed
 _FEW, _DEEP = 6, 8  # paths, and decisions on one, up to which no branch becomes a choice
 
 
-def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
+def trace(graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
     """Run a function on tracers and return its result in one dimension."""
     try:
         return _in_few_ways(graph, function, arguments)
@@ -53,7 +53,9 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         graph.settles = False
 
 
-def _in_few_ways(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
+def _in_few_ways(
+    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]]
+) -> Tracer:
     """Follow every way, or choices of numbers where there are too many."""
     # A condition that depends on tracers is followed both ways: the function runs again for every
     # way through it, and the results are combined by ``select``, which takes the branch that Python
@@ -70,7 +72,7 @@ def _in_few_ways(graph: Graph, function: Any, arguments: Callable[[], tuple[Any,
 
 
 def _traced(
-    graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]], left: list[int],
+    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]], left: list[int],
     *, merging: bool = False,
 ) -> Tracer:  # fmt: skip
     """Follow every way; with `merging`, branches that only compute numbers are one."""

@@ -94,7 +94,7 @@ def _fmpy() -> Any:
     return fmpy
 
 
-def _kind(path: Path, whole: Any, kind: str | None) -> str:
+def _kind(path: Path, whole: object, kind: str | None) -> str:
     """Return which of its kinds is meant: Model Exchange if it has that."""
     there = [name for name, key in _KINDS.items() if getattr(whole, key) is not None]
     if kind is None and there:

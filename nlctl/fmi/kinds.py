@@ -20,27 +20,27 @@ def in_model_exchange(of: Described, running: Running) -> Any:
     running.go_to(0.0, [float(v.start) for v in of.parameters])
     begins = dict(zip(names, running.states(), strict=True))
 
-    def put(t: float, x: Any, u: Any, p: Any) -> list[float]:
+    def put(t: float, x: Any, u: Any, p: object) -> list[float]:
         values = [getattr(p, field) for field in fields]
         running.go_to(x[n], values)
         running.put(t, x[:n], u)
         return values
 
-    def update(t: float, x: Any, u: Any, p: Any) -> Any:
+    def update(t: float, x: object, u: object, p: object) -> Any:
         put(t, x, u, p)
         return *running.rates(), 0.0
 
-    def output(t: float, x: Any, u: Any, p: Any) -> Any:
+    def output(t: float, x: object, u: object, p: object) -> Any:
         put(t, x, u, p)
         return running.outputs()
 
-    def guard(t: float, x: Any, u: Any, p: Any) -> Any:
+    def guard(t: float, x: Any, u: object, p: object) -> Any:
         values = put(t, x, u, p)
         z = running.indicators()
         due = running.next[running.go_to(x[n], values)]
         return *z, *(-each for each in z), min(due - t, 1e9)
 
-    def reset(t: float, x: Any, u: Any, p: Any) -> Any:
+    def reset(t: float, x: Any, u: object, p: object) -> Any:
         values = [getattr(p, field) for field in fields]
         return running.event(x[n], t, x[:n], u, values)
 
@@ -66,10 +66,10 @@ def in_co_simulation(of: Described, running: Running, name: str, dt: float) -> A
     def values(params: Any) -> list[float]:
         return [params[key] for key in parameters]
 
-    def update(t: float, x: Any, u: Any, params: Any) -> Any:
+    def update(t: float, x: Any, u: object, params: object) -> Any:
         return [running.step(x[0], u, values(params), dt)]
 
-    def output(t: float, x: Any, u: Any, params: Any) -> Any:
+    def output(t: float, x: Any, u: object, params: object) -> Any:
         running.go_to(x[0], values(params))
         return list(running.outputs())
 
@@ -81,9 +81,11 @@ def in_co_simulation(of: Described, running: Running, name: str, dt: float) -> A
 
 def _identifiers(variables: Sequence[Any]) -> list[str]:
     """Return what a record calls variables, such as states or parameters."""
-    found: list[str] = []
+    identifiers: list[str] = []
     for variable in variables:
-        made = re.sub(r"\W+", "_", variable.name).strip("_")
-        made = f"p_{made}" if not made.isidentifier() else made
-        found.append(made if made not in found else f"{made}_{len(found)}")
-    return found
+        identifier = re.sub(r"\W+", "_", variable.name).strip("_")
+        identifier = f"p_{identifier}" if not identifier.isidentifier() else identifier
+        identifiers.append(
+            identifier if identifier not in identifiers else f"{identifier}_{len(identifiers)}"
+        )
+    return identifiers

@@ -14,6 +14,7 @@ import os
 import warnings
 from collections.abc import Iterable
 from importlib import import_module
+from importlib.util import find_spec
 
 from .checkout import NLCTL_FOLDER
 from .former_name import GONE_IN
@@ -32,7 +33,12 @@ def face(room: str) -> str:
 
 def public_names(room: str) -> list[str]:
     """Return the ``__all__`` of a room, which is not imported."""
-    with open(face(room), "rb") as file:
+    return _listed_in(face(room))
+
+
+def _listed_in(path: str) -> list[str]:
+    """Return the ``__all__`` of a file."""
+    with open(path, "rb") as file:
         statements = ast.parse(file.read()).body
     return next(
         ast.literal_eval(one.value)
@@ -65,8 +71,20 @@ def found_in_room(name: str) -> object:
     return thing
 
 
+def _place_in_analysis(name: str) -> str | None:
+    """Return the room of the analysis that has a name, which is not imported."""
+    for room in ("lyapunov", "metrics", "robustness", "studies"):
+        spec = find_spec(f"nlctl.analysis.{room}")
+        if spec and spec.origin and name in _listed_in(spec.origin):
+            return f"nlctl.analysis.{room}"
+    return None
+
+
 def with_nearest(name: str, listed: Iterable[str]) -> str:
     """Return what is said of a name that the top does not have."""
+    place = None if name.startswith("_") else _place_in_analysis(name)
+    if place is not None:
+        return f"module 'nlctl' has no attribute '{name}'; it is {place}.{name}"
     places = {n: f"nlctl.{r}" for n, r in _places().items()} | dict.fromkeys(listed, "nlctl")
     by_small = {known.lower(): known for known in places}
     near = difflib.get_close_matches(name.lower(), by_small, n=1)

@@ -7,6 +7,7 @@ sides serves for it as it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -27,10 +28,10 @@ class Along:
 
     lowered: Lowered
     prepare: Any
-    point: Any  # ``point(t, x, u, c)``, once for each point
+    point: object  # ``point(t, x, u, c)``, once for each point
     # ``function(t, x, u, c, v, dx)``, every array with a direction in each column.  A direction
     # `v` has the rows of the states, the inputs, and time
-    function: Any
+    function: Callable[..., Any]
     # how linear equations with the Jacobian matrix of the states are solved
     elimination: Elimination
     c: np.ndarray = field(default_factory=lambda: np.zeros((0, DIRECTIONS)))  # (rows, DIRECTIONS)

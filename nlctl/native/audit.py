@@ -18,7 +18,15 @@ import numpy as np
 from ..blocks import supplied_of
 from ..delays.transport import PAST
 from ..diagrams import Apart, apart, override, supplied_blocks
-from ..diagrams.points import SHAKEN, PointValues, agree, explained, first_difference, values_now
+from ..diagrams.points import (
+    SHAKEN,
+    Point,
+    PointValues,
+    agree,
+    explained,
+    first_difference,
+    values_now,
+)
 from ..errors import AuditError, ParameterError
 from ..sampling.system import Happening, happening
 from ..supplied import SuppliedOutput, supplying
@@ -117,7 +125,7 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     declared = declared_rows(compiled.schedule, compiled.program, located)
     count, jumping = len(compiled.program.sampled), compiled.program.resets
 
-    def several(*point: Any) -> PointValues:
+    def several(*point: object) -> PointValues:
         dx, g, m = code.values(code.rhs, "dx g m", point, c)
         (y,) = code.values(code.out, "y", point, c)
         # next states are 0 as python-control has it where nothing is due
@@ -130,7 +138,7 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     return several
 
 
-def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any) -> None:
+def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Point) -> None:
     """Compare one point."""
     system = compiled.system
     ours = evaluated(*point)
@@ -161,7 +169,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
 
 
 def _compare_beyond_rounding(
-    compiled: Compiled, trial: Trial, point: Any, both: tuple[PointValues, PointValues]
+    compiled: Compiled, trial: Trial, point: Point, both: tuple[PointValues, PointValues]
 ) -> None:
     """Refuse values that differ by more than what rounding explains, looked at more closely."""
     ours, theirs = both
@@ -185,7 +193,7 @@ def _compare_beyond_rounding(
         raise _difference(differ, system.name, point[0])
 
 
-def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointValues:
+def _by_python_control(compiled: Compiled, point: Point, trial: Trial) -> PointValues:
     system = trial.of(compiled.schedule.system)
     lines, point = _lines(compiled, trial, point)
     with supplying(lines), happening():
@@ -207,7 +215,7 @@ def _by_block(compiled: Compiled, values: np.ndarray) -> dict[int, np.ndarray]:
     return dict(enumerate(np.split(values, ends[:-1])))
 
 
-def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
+def _compare_sliding(compiled: Compiled, trial: Trial, point: Point) -> None:
     """Compare the rates of sliding relays' inputs with those that they are to have."""
     # Python-control's right-hand side is compared with the relays' outputs as machine code has
     # them. That these keep the inputs where they are is seen here, from python-control's own rates.
@@ -231,7 +239,7 @@ def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
             )
 
 
-def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.ndarray:
+def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Point) -> np.ndarray:
     """Return how fast a relay's input changes along python-control's own rates."""
     # By differences before the point, around it and behind it.
     t, x, u = point
@@ -246,7 +254,7 @@ def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.
     return np.array([here - before, 0.5 * (after - before), after - here]) / part
 
 
-def _arriving(compiled: Compiled, trial: Trial, i: int, point: Any) -> float:
+def _arriving(compiled: Compiled, trial: Trial, i: int, point: Point) -> float:
     """Return what python-control finds at the input of an ideal relay."""
     lines, point = _lines(compiled, trial, point)
     with supplying(lines), happening():
@@ -254,7 +262,7 @@ def _arriving(compiled: Compiled, trial: Trial, i: int, point: Any) -> float:
     return float(lines[trial.of(compiled.schedule.nodes[i].system)].arriving[0])
 
 
-def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, SuppliedOutput], Any]:
+def _lines(compiled: Compiled, trial: Trial, point: Point) -> tuple[dict[Any, SuppliedOutput], Any]:
     """Return what leaves transport delays and relays, and the point with the diagram's inputs."""
     t, x, u = point
     own = compiled.system.ninputs or 0
@@ -273,7 +281,7 @@ def _line(values: np.ndarray) -> SuppliedOutput:
     return SuppliedOutput(leaving=lambda t: values, arriving=np.full(values.size, np.nan))
 
 
-def _later(point: Any, trial: Trial) -> float:
+def _later(point: Point, trial: Trial) -> float:
     """Return how much later rounding may make it; near t = 0 a part of the run counts."""
     # It must be seen next to phases: machine code knows that sin(w t + pi) is -sin(w t), NumPy's is
     # 1.2e-16 at t = 0.
@@ -281,7 +289,7 @@ def _later(point: Any, trial: Trial) -> float:
     return SHAKEN * max(abs(point[0]), step, _PART_OF_RUN * float(np.ptp(trial.time)))
 
 
-def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: Any) -> None:
+def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: Point) -> None:
     """Compare block by block: each with python-control's equations at the inputs it has here."""
     t, x, u = point
     nodes = compiled.schedule.nodes
@@ -321,7 +329,7 @@ def _with_every_output(compiled: Compiled) -> Schedule:
 
 
 def rounding(
-    compiled: Compiled, trial: Trial, point: Any, schedule: Schedule | None = None
+    compiled: Compiled, trial: Trial, point: Point, schedule: Schedule | None = None
 ) -> PointValues:
     """Return how far results may be moved by what the operations before them round."""
     schedule = schedule or compiled.schedule
@@ -366,7 +374,7 @@ def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], dict[int,
     c = np.zeros((lowered.size, 1))
     prepare(np.ascontiguousarray(p[:, None]), c)
 
-    def outputs(point: Any) -> dict[int, np.ndarray]:
+    def outputs(point: Point) -> dict[int, np.ndarray]:
         t, x, u = point
         y = np.empty((len(schedule.outputs), 1))
         out(np.array([t]), x[:, None], u[:, None], c, y)

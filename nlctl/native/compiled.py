@@ -87,7 +87,7 @@ class Compiled(Reading, StandIn):
         """The diagram that was compiled; runs write their parameters into a copy of it."""
         return super().system
 
-    def _refused(self, *_: Any, **__: Any) -> Any:
+    def _refused(self, *_: object, **__: object) -> Any:
         raise UsageError(
             f"'{self.system.name}' is compiled already: copy or rename its diagram, .system, and "
             "compile that"
@@ -188,13 +188,13 @@ class Compiled(Reading, StandIn):
     @as_annotated
     def linearize(
         self,
-        x0: Any,
-        u0: Any = None,
+        x0: object,
+        u0: object = None,
         t: float = 0.0,
         params: Mapping[str, Any] | None = None,
         *,
         copy_names: bool = True,
-        **names: Any,
+        **names: object,
     ) -> ct.StateSpace:
         """Return the linearization at a point, with exact derivatives.
 
@@ -245,26 +245,26 @@ class Compiled(Reading, StandIn):
         n, m, given = system.nstates or 0, system.ninputs or 0, self.schedule.ninputs
         jacobians.tell_of_differences(self)
         directions = np.eye(n + given + length(self.program.layout), n + m)
-        found = jacobians.jacobian(self, x0, u0, t, params, directions)
-        rates, outputs, dt = found["dx"], found["y"], system.dt
+        derivatives = jacobians.jacobian(self, x0, u0, t, params, directions)
+        rates, outputs, dt = derivatives["dx"], derivatives["y"], system.dt
         if self.program.sampled:
-            rates, outputs, dt = jacobians.over_a_period(self, found)
-        own = {
+            rates, outputs, dt = jacobians.over_a_period(self, derivatives)
+        names_of_diagram = {
             "name": f"{system.name}$linearized",
             "inputs": system.input_labels,
             "outputs": system.output_labels,
             "states": system.state_labels,
         }
         matrices = rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:]
-        return state_space(matrices, dt, (own if copy_names else {}) | names)
+        return state_space(matrices, dt, (names_of_diagram if copy_names else {}) | names)
 
     @as_annotated
     @with_parameters_of(linearize)
     def parameter_jacobian(
         self,
         parameters: Sequence[str],
-        x0: Any,
-        u0: Any = None,
+        x0: object,
+        u0: object = None,
         t: float = 0.0,
         params: Mapping[str, Any] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -301,7 +301,14 @@ class Compiled(Reading, StandIn):
         return found["dx"], found["y"]
 
     def _call(
-        self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
+        self,
+        function: Rhs,
+        size: int | None,
+        t: float,
+        x: object,
+        u: object,
+        params: Mapping[str, Any] | None,
+        *more: object,
     ):
         if self.schedule.lines:
             raise UsageError(
@@ -414,13 +421,13 @@ def compile(  # noqa: A001 (what it does)
 @with_parameters_of(Compiled.linearize)
 def linearize(
     system: System,
-    x0: Any,
-    u0: Any = None,
+    x0: object,
+    u0: object = None,
     t: float = 0.0,
     params: Mapping[str, Any] | None = None,
     *,
     copy_names: bool = True,
-    **names: Any,
+    **names: object,
 ) -> ct.StateSpace:
     """Linearize a diagram at a point, with exact derivatives of its equations.
 

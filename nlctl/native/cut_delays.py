@@ -6,6 +6,7 @@ equal, and of small sines the one is the other times exp(-s tau).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,9 @@ class Derivatives(NamedTuple):
 class CutDiagram:
     """A compiled diagram with parameters, at a time, with its delays cut."""
 
-    def __init__(self, who: str, compiled: Compiled, t: float, params: Any) -> None:
+    def __init__(
+        self, who: str, compiled: Compiled, t: float, params: Mapping[str, Any] | None
+    ) -> None:
         system, read = compiled.system, compiled.schedule
         named = [node.path for node in read.nodes if node.sampled]
         if named:
@@ -99,7 +102,7 @@ class CutDiagram:
             w = w + np.linalg.lstsq(slope, gap, rcond=None)[0]
         return w
 
-    def inputs(self, who: str, name: str, given: Any) -> np.ndarray:
+    def inputs(self, who: str, name: str, given: object) -> np.ndarray:
         """Return the inputs at a point, shape (ninputs,)."""
         what = f"{name} of '{self.compiled.system.name}'"
         return point_numbers(f"{who} needs", self.m, what, given)

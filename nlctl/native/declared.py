@@ -45,13 +45,13 @@ def _is_own(node: Node) -> bool:
 
 def declared_labels(schedule: Schedule) -> tuple[list[str], list[str]]:
     """Return names of the rows of `declared_now`."""
-    found: dict[str, list[str]] = {what: [] for what in _DECLARED}
-    for (what, count), node in _each(schedule.nodes):
-        found[what] += [f"{node.path}: {name}" for name in numbered(what, count)]
+    labels: dict[str, list[str]] = {equation: [] for equation in _DECLARED}
+    for (equation, count), node in _each(schedule.nodes):
+        labels[equation] += [f"{node.path}: {name}" for name in numbered(equation, count)]
     guarded = [node for node in schedule.nodes if count_guards(node)]
     states = [f"{n.path}: reset of '{name}'" for n in guarded for name in n.system.state_labels]
     watched = [each.name for each in schedule.watched]
-    return [*found["switching"], *watched, *found["guard"], *found["commit"]], states
+    return [*labels["switching"], *watched, *labels["guard"], *labels["commit"]], states
 
 
 def declared_now(
@@ -61,19 +61,19 @@ def declared_now(
     t, x, u = point
     parts = dict(zip(map(id, schedule.nodes), parts_now(system, t, x, u), strict=True))
 
-    def value(what: str, node: Node) -> np.ndarray:
-        block, own, given = parts[id(node)]
-        return equation_now(block, what, t, own, given)
+    def value(equation: str, node: Node) -> np.ndarray:
+        block, states, inputs = parts[id(node)]
+        return equation_now(block, equation, t, states, inputs)
 
-    found: dict[str, list[np.ndarray]] = {what: [] for what in _DECLARED}
-    for (what, _), node in _each(schedule.nodes):
-        found[what].append(value(what, node))
+    computed: dict[str, list[np.ndarray]] = {equation: [] for equation in _DECLARED}
+    for (equation, _), node in _each(schedule.nodes):
+        computed[equation].append(value(equation, node))
     resets = [value("reset", node) for node in schedule.nodes if count_guards(node)]
-    kept = [place for node in schedule.nodes if _is_own(node) for place in memory(node)]
+    memories = [place for node in schedule.nodes if _is_own(node) for place in memory(node)]
     now = np.array(x, dtype=float)
-    now[kept] = np.concatenate([np.zeros(0), *found["commit"]])
+    now[memories] = np.concatenate([np.zeros(0), *computed["commit"]])
     watched = [[one.value(t, now, u, dict(schedule.overrides))] for one in schedule.watched]
-    rows = [*found["switching"], *watched, *found["guard"], *found["commit"]]
+    rows = [*computed["switching"], *watched, *computed["guard"], *computed["commit"]]
     return np.concatenate([np.zeros(0), *rows]), np.concatenate([np.zeros(0), *resets])
 
 

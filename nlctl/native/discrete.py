@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 from ..errors import ParameterError
+from ..upstream.systems import System
 from .compiled import Compiled
 from .machine import address
 from .machine.address import call_out, call_rhs
@@ -43,7 +44,7 @@ def simulate_discrete(
     return outputs[:n, :, 0].T.copy(), states[:n, :, 0].T.copy()
 
 
-def _check_times(system: Any, times: np.ndarray) -> None:
+def _check_times(system: System, times: np.ndarray) -> None:
     steps = np.diff(times)
     if not ct.isdtime(system, strict=True):
         raise ParameterError(f"'{system.name}' has dt = {system.dt} and is no discrete-time system")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
 from ..arguments import ATOL, RTOL, one_of
@@ -36,7 +37,7 @@ from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
 from .driver import Course, begin, finish, prepared, trajectory, watched
-from .ensemble_result import Ensemble, MetricLike
+from .ensemble_result import Ensemble, MetricLike, SignalsByName
 from .happened import happened
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
@@ -53,9 +54,9 @@ if TYPE_CHECKING:
 @as_annotated
 def ensemble_response(
     compiled: Compiled | ct.InputOutputSystem,
-    timepts: Any = None,
-    inputs: Any = 0.0,
-    initial_state: Any = None,
+    timepts: ArrayLike | None = None,
+    inputs: object = 0.0,
+    initial_state: object = None,
     *,
     params: Mapping[str, Any] | None = None,
     metrics: Sequence[MetricLike] = (),
@@ -69,7 +70,7 @@ def ensemble_response(
     hold: str = "foh",
     progress: Callable[[int], object] | None = None,
     audit: Audit = True,
-    **aliases: Any,
+    **aliases: object,
 ) -> Ensemble:
     """Simulate many members that differ in parameters and initial states.
 
@@ -173,7 +174,7 @@ def ensemble_response(
     asked = _Asked(times=times, course=course, metrics=metrics)
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     rows = _run(_runner(every, asked, kept, audit), every.size, threads or cores(), progress)
-    return Ensemble(table=_table(every, rows), time=times, signals=kept)
+    return Ensemble(table=_table(every, rows), time=times, signals=SignalsByName(kept))
 
 
 def _check_signals(compiled: Compiled, keep: Sequence[str], metrics: Sequence[MetricLike]) -> None:

@@ -51,6 +51,14 @@ class SpecLike(Protocol):
 ROWS = 8  # rows of its table that an ensemble prints
 
 
+class SignalsByName(dict[str, np.ndarray]):
+    """Signals by name; of others it says how they are kept."""
+
+    def __missing__(self, name: object) -> np.ndarray:
+        where = "among those that were kept, ensemble_response(..., keep=[...])"
+        raise unknown("signal", str(name), self, where)
+
+
 @described_record(made_by="ensemble_response", repr=False)
 class Ensemble:
     """Runs of one diagram."""

@@ -88,24 +88,24 @@ def frequency_response(
     True
     """
     checked_params(params)
-    made = as_compiled(system, params)
-    if not ct.isctime(made.system):
+    compiled = as_compiled(system, params)
+    if not ct.isctime(compiled.system):
         raise ParameterError(
-            f"{_WHO} needs a diagram in continuous time, and '{made.system.name}' has "
-            f"dt = {made.system.dt}: ct.frequency_response(nlctl.linearize(diagram, x0)) has it"
+            f"{_WHO} needs a diagram in continuous time, and '{compiled.system.name}' has "
+            f"dt = {compiled.system.dt}: ct.frequency_response(nlctl.linearize(diagram, x0)) has it"
         )
-    cut = CutDiagram(_WHO, made, number(_WHO, "t", t), params)
+    cut = CutDiagram(_WHO, compiled, number(_WHO, "t", t), params)
     delays = cut.delays(_WHO)
     linear = _around(cut, at, inputs)
     w = _default(linear, delays) if omega is None else _checked(omega)
     return ct.FrequencyResponseData(
         np.moveaxis(_closed(cut, linear, delays, w), 0, -1), w,
-        inputs=made.system.input_labels, outputs=made.system.output_labels,
-        name=made.system.name, sysname=made.system.name,
+        inputs=compiled.system.input_labels, outputs=compiled.system.output_labels,
+        name=compiled.system.name, sysname=compiled.system.name,
     )  # fmt: skip
 
 
-def _around(cut: CutDiagram, at: Any, inputs: Any) -> Derivatives:
+def _around(cut: CutDiagram, at: object, inputs: object) -> Derivatives:
     """Return the derivatives around a point."""
     if isinstance(at, ct.OperatingPoint):
         at, inputs = at.states, at.inputs if inputs is None else inputs
@@ -115,7 +115,7 @@ def _around(cut: CutDiagram, at: Any, inputs: Any) -> Derivatives:
     return cut.derivatives(x, u, cut.leaving(x, u))
 
 
-def _checked(omega: Any) -> np.ndarray:
+def _checked(omega: object) -> np.ndarray:
     """Return the frequencies."""
     w = vector(_WHO, "omega", np.atleast_1d(omega) if np.isscalar(omega) else omega)
     if not w.size or w[0] < 0 or not np.all(np.diff(w) > 0):

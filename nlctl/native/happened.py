@@ -10,8 +10,10 @@ from ..responses.event_log import EventLog
 from ..wording import numbered
 from .compiled import Compiled
 from .diagram.program import count_guards, count_switching_functions
+from .equations.located import Conditions
 from .integrate.log import OF_TIME, log_room
 from .integrate.memory import grown, with_fields
+from .integrate.workspace import Task, Work
 
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
@@ -19,7 +21,7 @@ _WORDS = {
 }  # fmt: skip
 
 
-def with_log(task: Any, work: Any) -> Any:
+def with_log(task: Task, work: Work) -> Any:
     """Return a workspace with room for what happens next; what is noted stays."""
     free = work.log.t.shape[0] - int(work.lanes["noted"].max())
     least = log_room(task, work.events.g.shape[0])
@@ -32,7 +34,7 @@ def with_log(task: Any, work: Any) -> Any:
 class _Labelled(NamedTuple):
     """What rows are called, with the conditions that they are of."""
 
-    conditions: Any
+    conditions: Conditions
     rows: list[tuple[str, str]]
 
 
@@ -45,7 +47,7 @@ def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
     ).rows
 
 
-def _labelled(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
+def _labelled(compiled: Compiled, conditions: Conditions) -> list[tuple[str, str]]:
     labels: list[tuple[str, str]] = []
     nodes = compiled.schedule.nodes
     for node in nodes:

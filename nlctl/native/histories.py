@@ -14,6 +14,7 @@ from .diagram.schedule import Schedule
 from .integrate.delayed import DelayLines
 from .integrate.delays import SMOOTH
 from .integrate.memory import grown, with_fields, with_table
+from .integrate.workspace import Task, Work
 from .reading import Reading
 
 _ROOM = 256  # steps that are kept at first
@@ -44,7 +45,7 @@ def lines_of(
     )  # fmt: skip
 
 
-def with_past(reading: Reading, task: Any, work: Any, p: np.ndarray) -> Any:
+def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
     """Return the workspace of a run that begins with what signals were before it."""
     lines, lanes = task.lines.delays.shape
     if not lines:
@@ -82,7 +83,7 @@ def with_past(reading: Reading, task: Any, work: Any, p: np.ndarray) -> Any:
     return work
 
 
-def arriving_first(reading: Reading, task: Any) -> np.ndarray:
+def arriving_first(reading: Reading, task: Task) -> np.ndarray:
     """Return what leaves the delays where a run begins, shape (lines,)."""
     begin, nodes = float(task.times[0]), reading.schedule.nodes
     specs = [nodes[line.block or 0].system.current_spec for line in reading.schedule.lines]
@@ -91,7 +92,7 @@ def arriving_first(reading: Reading, task: Any) -> np.ndarray:
     return np.array([before(t, sent)[row] for row, t in enumerate(sent)])
 
 
-def with_room(task: Any, work: Any) -> Any:
+def with_room(task: Task, work: Work) -> Any:
     """Return the workspace with places for more steps, where there are none."""
     # What no delay reaches back to is forgotten; if that is less than half, there is more room.
     room = work.past.t.shape[0]
@@ -113,7 +114,7 @@ def with_room(task: Any, work: Any) -> Any:
     return work if work.past.kept.max() <= room // 2 else _with_places(work, 2 * room)
 
 
-def _with_places(work: Any, room: int) -> Any:
+def _with_places(work: Work, room: int) -> Any:
     """Return the workspace with places for so many steps."""
     return with_fields(work, past=grown(work.past, _KEPT, room))
 

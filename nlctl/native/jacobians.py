@@ -121,7 +121,12 @@ def along(
 
 
 def jacobian(
-    reading: Reading, x0: Any, u0: Any, t: float, params: Any, directions: np.ndarray
+    reading: Reading,
+    x0: object,
+    u0: object,
+    t: float,
+    params: Mapping[str, Any] | None,
+    directions: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Return the derivatives of the right-hand side and of the outputs along directions."""
     # Shapes: `directions` (nstates + inputs of the program + parameters, k).
@@ -173,7 +178,7 @@ def searches_of(equations: Equations) -> dict[str, Callable[[np.ndarray], np.nda
     }
 
 
-def point_numbers(needs: str, count: int, what: str, given: Any) -> np.ndarray:
+def point_numbers(needs: str, count: int, what: str, given: object) -> np.ndarray:
     """Return so many finite numbers, 0 by default, or one for all of them; shape (count,)."""
     numbers = as_numbers(0.0 if given is None else given)
     if numbers is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,10 @@ from .timed.ahead import ahead
 
 
 def known_conditions(
-    system: System, params: Any, times: np.ndarray, watched: tuple[Watched, ...] = ()
+    system: System,
+    params: Mapping[str, Any] | None,
+    times: np.ndarray,
+    watched: tuple[Watched, ...] = (),
 ) -> Known:
     """Return what is known of the conditions of a diagram; nothing where it cannot be read."""
     if not ct.isctime(system):
@@ -69,7 +72,7 @@ def _crossings(compiled: Compiled, p: np.ndarray, which: slice) -> Callable[...,
     given = now, x_now, u_now, c, dx, g, m
     rhs = code.rhs.bound(*given) if isinstance(code.rhs, Routine) else partial(code.rhs, *given)
 
-    def crossings(t: float, x: Any, u: Any) -> np.ndarray:
+    def crossings(t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         now[0], x_now[:, 0], u_now[:, 0] = t, x, u
         rhs()
         return g[which, 0].copy()

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -101,7 +100,7 @@ class Lowered:
         samples = {name for name in self.functions if name.startswith("sample")}
         return frozenset(samples | {"prepare"} if samples else ())
 
-    def holds_for(self, p: Any) -> bool:
+    def holds_for(self, p: object) -> bool:
         """Whether the program holds for parameters `p`, an array with a row per number."""
         values = np.asarray(p)
         return all(bool((values[i] == v).all()) for i, v in self.assumed.items())

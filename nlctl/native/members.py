@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import control as ct
 import numpy as np
 
 from ..blocks import Block
@@ -132,7 +133,7 @@ class Members:
         return [(nodes[i], layout[i], names) for i, names in found.items()]
 
 
-def members(compiled: Compiled, params: Mapping[str, Any], states: Any) -> Members:
+def members(compiled: Compiled, params: Mapping[str, Any], states: object) -> Members:
     """Gather the members of an ensemble."""
     if states is not None and not isinstance(states, Mapping):
         states = _by_name(compiled.system, states)
@@ -154,7 +155,7 @@ def members(compiled: Compiled, params: Mapping[str, Any], states: Any) -> Membe
     return Members(compiled=compiled, params=values, states=initial, size=size)
 
 
-def _by_name(system: Any, states: Any) -> dict[str, np.ndarray]:
+def _by_name(system: ct.NonlinearIOSystem, states: object) -> dict[str, np.ndarray]:
     """Return states by name that are given as one state, or as a row for each member."""
     # States that no member changes are left out.
     given = as_numbers(states)
@@ -171,11 +172,11 @@ def _by_name(system: Any, states: Any) -> dict[str, np.ndarray]:
     return {names[i]: columns[i] if rows.ndim == 2 else columns[i, 0] for i in changed}
 
 
-def _member_state(system: Any, number: int, row: np.ndarray) -> np.ndarray:
+def _member_state(system: ct.NonlinearIOSystem, number: int, row: np.ndarray) -> np.ndarray:
     try:
         return state_array(system, row)
     except ParameterError as error:
-        raise ParameterError(f"{error} (member {number})") from None
+        raise ParameterError(f"{error} (member {number}); a row is a member") from None
 
 
 def _finite(name: str, value: object) -> np.ndarray:

@@ -118,7 +118,7 @@ def find_operating_point(
     derivs: ArrayLike | None = None,
     root_method: str | None = None,
     return_outputs: bool = False,
-    **aliases: Any,
+    **aliases: object,
 ) -> OperatingPoint:
     """Find an equilibrium or another operating point, as ``ct.find_operating_point`` does.
 
@@ -302,7 +302,7 @@ def _places(kind: str, given: Any, names: Sequence[str], every: bool) -> np.ndar
     return np.unique(np.array(found, dtype=int))
 
 
-def _place(kind: str, each: Any, names: Sequence[str]) -> int:
+def _place(kind: str, each: object, names: Sequence[str]) -> int:
     if isinstance(each, str):
         return list(names).index(find_name(kind, each, dict.fromkeys(names)))
     if isinstance(each, bool) or not isinstance(each, int | np.integer):

@@ -42,7 +42,7 @@ class Reading:
 
     schedule: Schedule  # what was read from the diagram
     program: Program  # the arrays that machine code takes and fills
-    original: Any = None  # the diagram itself; none in another process
+    original: object = None  # the diagram itself; none in another process
     apart: Apart | None = None  # the copy of it that was read, in which runs write their parameters
     # what has been made of it, such as machine code
     cache: Cache = field(init=False, repr=False, default_factory=Cache)
@@ -213,6 +213,6 @@ def _check_fixed(values: Iterable[Any]) -> None:
         raise _CanChange
 
 
-def is_fixed(value: Any) -> bool:
+def is_fixed(value: object) -> bool:
     """Whether a value cannot change in place."""
     return type(value) in _FIXED or (type(value) is tuple and all(map(is_fixed, value)))

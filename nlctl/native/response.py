@@ -32,17 +32,17 @@ _LARGE = 1e6  # a state that a message names, in its unit
 def respond(
     compiled: Compiled,
     times: np.ndarray,
-    inputs: Any = 0.0,
+    inputs: object = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
     settings: Settings,
     params: Mapping[str, Any] | None = None,
-    evaluation_times: Any = "T",
+    evaluation_times: object = "T",
     ignore_errors: bool = False,
     progress: Callable[[float], object] | None = None,
     audit: Audit = True,
     watched: tuple[Watched, ...] = (),
-    **form: Any,
+    **form: object,
 ) -> Response:
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments."""
     system = compiled.system

@@ -10,6 +10,7 @@ import numpy as np
 
 from .along import Along
 from .chattering.steps import Jump
+from .integrate.workspace import Task, Work
 from .machine.evaluations import Machine
 from .spare import Spare
 
@@ -19,8 +20,8 @@ class Run:
     """Members that are integrated in a batch, and all arrays that this needs."""
 
     machine: Machine
-    task: Any  # see `integrate.workspace`
-    work: Any
+    task: Task  # see `integrate.workspace`
+    work: Work
     # exact derivatives, if the stiff method has asked for them and there are any
     along: Along | None = None
     # of members that chatter, by their lanes: where

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import ATOL, RTOL
-from ..errors import ParameterError
+from ..errors import ParameterError, UnknownNameError
 from ..names import unknown
 from .integrate.methods import EXPLICIT_PAIRS
 from .integrate.methods.tableau import Tableau
@@ -65,7 +65,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         if not isinstance(self.method, Tableau) and self.method not in METHODS:
-            raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
+            error = unknown("method", str(self.method), METHODS, "of machine code")
+            raise UnknownNameError(
+                f"{error}; those of SciPy, 'RK45' say, are for input_output_response of a diagram"
+            )
         for name in ("rtol", "atol", "step", "max_steps", "max_step"):
             if not isinstance(getattr(self, name), Real):
                 raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
@@ -86,7 +89,7 @@ def solver_settings(
     method: str | Tableau | None,
     solve_ivp_method: str | None,
     solve_ivp_kwargs: Mapping[str, Any] | None,
-    **settings: Any,
+    **settings: object,
 ) -> Settings:
     """Return the settings of a run in machine code."""
     keywords = dict(solve_ivp_kwargs or {})

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from contextvars import copy_context
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import control as ct
@@ -258,7 +259,7 @@ def _local_names() -> Iterator[dict[Expr, str]]:
     """Note how functions that are traced meanwhile call what they compute."""
     found: dict[Expr, str] = {}
 
-    def noted(frame: Any, event: str, _: Any) -> None:
+    def noted(frame: FrameType, event: str, _: object) -> None:
         if event != "return" or frame.f_code.co_filename.startswith(_OWN):
             return  # (also what dataclasses write: "<string>")
         for name, value in frame.f_locals.items():

@@ -181,7 +181,7 @@ def _called(name: str, function: Callable, *args: np.ndarray) -> np.ndarray:
         ) from error
 
 
-def _numbers(name: str, given: Any, otherwise: np.ndarray) -> Any:
+def _numbers(name: str, given: object, otherwise: np.ndarray) -> Any:
     """Return finite numbers of a shape as tuples, those of `otherwise` if there are none."""
     matrix = as_numbers(given)
     if matrix is not None and not matrix.size:
@@ -194,7 +194,7 @@ def _numbers(name: str, given: Any, otherwise: np.ndarray) -> Any:
     return nested_tuple(matrix.tolist())
 
 
-def _check_covariance(name: str, rows: Any, *, definite: bool = False) -> None:
+def _check_covariance(name: str, rows: object, *, definite: bool = False) -> None:
     """Refuse a matrix that is not symmetric, or not positive."""
     matrix = np.array(rows, dtype=float)
     square = matrix.shape[0] == matrix.shape[1]

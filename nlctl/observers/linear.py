@@ -82,7 +82,7 @@ class LuenbergerObserver:
         return x.copy()
 
 
-def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> LuenbergerObserver:
+def luenberger(plant: ct.StateSpace, poles: object = None, *, L: Any = None) -> LuenbergerObserver:
     """Make a Luenberger observer of a linear plant, by its poles or its gain.
 
     Parameters

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ..arguments import are_names, names_in
 from ..errors import ParameterError
 
@@ -13,7 +11,7 @@ def estimate_names(count: int) -> tuple[str, ...]:
     return tuple(f"x{i}_hat" for i in range(1, count + 1))
 
 
-def set_names(spec: Any, key: str, count: int | None, at_least: int = 1) -> None:
+def set_names(spec: object, key: str, count: int | None, at_least: int = 1) -> None:
     """Make a field of a record a tuple of names; refuse what is none, and another number."""
     who, given = type(spec).__name__, getattr(spec, key)
     names = names_in(given)

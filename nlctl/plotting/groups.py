@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
 
 import control as ct
 import numpy as np
@@ -32,7 +31,7 @@ class Wires:
     pairs: tuple[tuple[str, str], ...] = ()
 
 
-def wires_of(system: Any) -> Wires:
+def wires_of(system: object) -> Wires:
     """Return where the outputs of a diagram come from; of a block there is nothing to say."""
     if not isinstance(system, ct.InterconnectedSystem):
         return Wires()
@@ -47,7 +46,9 @@ def wires_of(system: Any) -> Wires:
     return Wires(blocks=blocks, pairs=tuple(_pairs(system, offsets, shown)))
 
 
-def _pairs(system: Any, offsets: np.ndarray, shown: Mapping[int, str]) -> Iterator[tuple[str, str]]:
+def _pairs(
+    system: ct.InterconnectedSystem, offsets: np.ndarray, shown: Mapping[int, str]
+) -> Iterator[tuple[str, str]]:
     first = 0
     for part, begin in zip(system.syslist, offsets, strict=False):
         fed = (
@@ -60,7 +61,7 @@ def _pairs(system: Any, offsets: np.ndarray, shown: Mapping[int, str]) -> Iterat
         first += part.ninputs or 0
 
 
-def _is_actuator(part: Any) -> bool:
+def _is_actuator(part: ct.NonlinearIOSystem) -> bool:
     """Whether a block has one input and one output, in one unit as far as one can know."""
     # That is a block from u to v, and a function without states that is not linear.
     if (part.ninputs, part.noutputs) != (1, 1) or isinstance(part, ct.StateSpace):

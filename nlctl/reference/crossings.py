@@ -71,17 +71,17 @@ def first_event(
     sides[:, :guards] = np.where(seen[:, :guards] >= 0.0, 1.0, -1.0)
     for k in range(1, len(t)):  # what is exactly 0 is still on its side
         sides[k] = np.where(sides[k] == 0.0, sides[k - 1], sides[k])
-    found = Event(np.inf, -1)
+    first = Event(np.inf, -1)
     for i, k in _suspects(seen[:, :signed], sides, guards):
-        if t[max(k - 1, 0)] < found.time:
-            found = min(found, _crossing(look, t, sides[k, i], i, k, seen[:, i], i < guards))
+        if t[max(k - 1, 0)] < first.time:
+            first = min(first, _crossing(look, t, sides[k, i], i, k, seen[:, i], i < guards))
     least = small(np.abs(seen[:, signed:]).max(axis=0, initial=0.0))
     for i in range(signed, before.size):
-        found = min(found, _memory(look, t, i, seen[:, i], least[i - signed], found.time))
-    if not found.time <= end:
+        first = min(first, _memory(look, t, i, seen[:, i], least[i - signed], first.time))
+    if not first.time <= end:
         return None
     apart = _TOGETHER * max(abs(begin), abs(end))
-    return Event(min(found.time + apart, end), found.number, max(found.time - apart, begin))
+    return Event(min(first.time + apart, end), first.number, max(first.time - apart, begin))
 
 
 def is_followed(values: np.ndarray) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from typing import Any
 
@@ -49,7 +49,9 @@ class Still:
 
     status = "running"
 
-    def __init__(self, rates: Any, t: float, y: Any, end: float, max_step: float, **_: Any) -> None:
+    def __init__(
+        self, rates: object, t: float, y: np.ndarray, end: float, max_step: float, **_: object
+    ) -> None:
         self.t, self.t_old, self.y, self._end, self._step = t, t, y, end, max_step
 
     def step(self) -> None:
@@ -77,12 +79,12 @@ class Driver:
     def __init__(
         self,
         system: System,  # in continuous time, with the parameters of the run
-        inputs: Any,  # ``inputs(t)``: those of the diagram
-        wanted: Any,  # times of the response (s); None for the integrator's own steps
+        inputs: Callable[[float], np.ndarray],  # ``inputs(t)``: those of the diagram
+        wanted: np.ndarray | None,  # times of the response (s); None for the integrator's own steps
         *, stops: Stops, jumps: Jumps, known: Past,
-        method: Any,  # a `scipy.integrate.OdeSolver`
-        settings: Any,  # its arguments: rtol, atol, max_step and so on
-        progress: Any = None,  # ``progress(t)`` after every accepted step
+        method: type,  # a `scipy.integrate.OdeSolver`
+        settings: Mapping[str, Any],  # its arguments: rtol, atol, max_step and so on
+        progress: Callable[[float], object] | None = None,  # of t, after every accepted step
     ) -> None:  # fmt: skip
         self.system, self.inputs, self.wanted = system, inputs, wanted
         self.stops, self.jumps, self.known = stops, jumps, known
@@ -206,7 +208,7 @@ class Driver:
         own[:] = np.where(own == 0.0, came * np.finfo(float).tiny, own)
         return seen
 
-    def _allowed(self, solver: Any, state: Any, bound: float, stop: float) -> float:
+    def _allowed(self, solver: Any, state: Callable[..., Any], bound: float, stop: float) -> float:
         """Return how long the step just made should have been, 0 if it is right.
 
         One from which a function of t alone moves soon is shorter; behind that they grow again.
@@ -306,7 +308,7 @@ class Driver:
         """Return what is seen, on the side of the next stop that the run comes from."""
         return self.jumps.look(min(t, self._last), x)
 
-    def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
+    def _note(self, event: Event, seen: np.ndarray, state: Callable[..., Any]) -> None:
         """Note what happens, and all switching functions and conditions that change their signs."""
         x = state(event.time)
         if event.number >= self.jumps.kinds[0]:  # jumps of guards have a test of their own
@@ -329,7 +331,7 @@ class Driver:
         sides[:guards] = 1.0
         return sides
 
-    def _note_left(self, t: float, until: float, state: Any) -> None:
+    def _note_left(self, t: float, until: float, state: Callable[..., Any]) -> None:
         """Note what leaves the 0 at which it has been since the run began; no run ends by that."""
         waits = self._came == 0.0
         waits[self.jumps.switching] = False

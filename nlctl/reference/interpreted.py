@@ -50,16 +50,16 @@ def python_control_response(
     system, times = apart(run.system).system, run.times
     params = override(system, run.params)
     run = replace(run, system=system, params=params)  # from here on this run's own copy
-    for made in supplied_blocks(system, SLIDING):
-        raise UsageError(f"block '{made.name}' {SLIDING.why}")
+    for relay in supplied_blocks(system, SLIDING):
+        raise UsageError(f"block '{relay.name}' {SLIDING.why}")
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None
     x0: Any = run.initial_state if whole else state_array(system, run.initial_state)
-    wanted = run.evaluation_times  # None: the integrator's own steps
-    if wanted is not None:
-        wanted = evaluation_array(wanted, times)
-        if wanted.size == 1 and system.isdtime(strict=True):
+    evaluation = run.evaluation_times  # None: the integrator's own steps
+    if evaluation is not None:
+        evaluation = evaluation_array(evaluation, times)
+        if evaluation.size == 1 and system.isdtime(strict=True):
             raise ParameterError("evaluation_times of a sampled system needs two times, got one")
     method, settings = _integrator(run)
     sizes = (system.ninputs, system.noutputs, system.nstates)
@@ -70,8 +70,8 @@ def python_control_response(
                     f"'{system.name}' is in discrete time, or does not say how many signals it "
                     "has: stop_when and events are for others"
                 )
-            return _by_python_control(run, inputs, x0, wanted, (method, settings))
-        return _driven(run, (inputs, x0, wanted), (method, settings), known)
+            return _by_python_control(run, inputs, x0, evaluation, (method, settings))
+        return _driven(run, (inputs, x0, evaluation), (method, settings), known)
 
 
 def _integrator(run: RunArguments) -> tuple[Any, dict[str, Any]]:

@@ -79,21 +79,23 @@ class Jumps:
     def look(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return guards, switching functions and crossings, and what memories would become."""
         u, seen = self.inputs(t), [_NOTHING]
-        found = dict.fromkeys(self._blocks, ())
+        values = dict.fromkeys(self._blocks, ())
         if self._own:
             parts = list(parts_now(self.system, t, x, u))
-            found = {what: _values(what, own, t, parts) for what, own in self._blocks.items()}
-            seen = [row for what in ("guard", "switching") for _, row in found[what]]
+            values = {
+                equation: _values(equation, own, t, parts) for equation, own in self._blocks.items()
+            }
+            seen = [row for equation in ("guard", "switching") for _, row in values[equation]]
         if self.crossings is not None:
-            given = np.concatenate([u, self._leaving(t)])
-            seen.append(np.asarray(self.crossings(t, x, given), dtype=float).reshape(-1))
-        become = np.concatenate([_NOTHING, *(row for _, row in found["commit"])])
+            arriving = np.concatenate([u, self._leaving(t)])
+            seen.append(np.asarray(self.crossings(t, x, arriving), dtype=float).reshape(-1))
+        become = np.concatenate([_NOTHING, *(row for _, row in values["commit"])])
         if self.watched and become.size:
             x = x.copy()
             x[self.memories] = become
         seen.append(self.watched_at(t, x))
         if self.labels is None:
-            self._label(found, sum(row.size for row in seen))
+            self._label(values, sum(row.size for row in seen))
         return np.concatenate([*seen, become])
 
     def followed(self, t: np.ndarray, state: Callable[[float], np.ndarray]) -> float:
@@ -168,7 +170,7 @@ class Jumps:
         return x
 
     def at(
-        self, t: float, x: np.ndarray, what: Happening, sides: Any
+        self, t: float, x: np.ndarray, what: Happening, sides: object
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the state after all that happens at an instant, and what guards are >= 0 then.
 

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 from ..blocks import Block
 from ..delays.pieces import PLACES
+from ..delays.transport import TransportDelay
 from ..delays.variation import check_positive, variation
 from ..supplied import SuppliedOutput
 from .stops import TIME_ROUNDING
@@ -33,7 +34,9 @@ _ASIDE = 1e-9  # part of a step: what lies so close to its end is read from insi
 class Past:
     """What is known of delayed signals while a run goes on."""
 
-    def __init__(self, blocks: list[Block], begin: float, end: float, tolerances: Any) -> None:
+    def __init__(
+        self, blocks: list[Block], begin: float, end: float, tolerances: tuple[float, float]
+    ) -> None:
         # Of transport delays with the parameters of the run; polynomials settle to rtol and atol.
         self.specs: list[Any] = [made.current_spec for made in blocks]
         self.begin, self.end, self._tolerances = begin, end, tolerances
@@ -74,18 +77,18 @@ class Past:
             return stop
         later = [self._arrival(spec, s) for s in self.breaks for spec in self.specs]
         ahead = (s for s in later if s > t + TIME_ROUNDING * abs(t))
-        found = min([stop, *(self._arrival(spec, t) for spec in self.specs), *ahead])
-        found = stop if stop - found <= TIME_ROUNDING * abs(stop) else found
-        least = self._rounding(found)  # pieces may be as short as that
-        while found - t > max(_STEPS * min(self._read(t, found), default=math.inf), least):
-            found = t + 0.5 * (found - t)  # short steps only where they are needed
-        return found
+        next_stop = min([stop, *(self._arrival(spec, t) for spec in self.specs), *ahead])
+        next_stop = stop if stop - next_stop <= TIME_ROUNDING * abs(stop) else next_stop
+        least = self._rounding(next_stop)  # pieces may be as short as that
+        while next_stop - t > max(_STEPS * min(self._read(t, next_stop), default=math.inf), least):
+            next_stop = t + 0.5 * (next_stop - t)  # short steps only where they are needed
+        return next_stop
 
     def _rounding(self, t: float) -> float:
         """Return what rounding alone may set two times apart by, at a time of the run (s)."""
         return TIME_ROUNDING * max(abs(t), self.end - self.begin)
 
-    def _arrival(self, spec: Any, s: float) -> float:
+    def _arrival(self, spec: TransportDelay, s: float) -> float:
         """Return when leaves a delay what it is given at time s; inf behind the run."""
         if spec.varying is None:
             return s + spec.delay
@@ -160,6 +163,6 @@ class Past:
         return bool(np.all(np.abs(piece[-2:]) <= atol + rtol * size))
 
 
-def _sent(spec: Any, t: float) -> float:
+def _sent(spec: TransportDelay, t: float) -> float:
     """Return when a delay was given what leaves it at time t."""
     return t - (spec.delay + spec.varied(t))

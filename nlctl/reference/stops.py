@@ -20,8 +20,8 @@ class Stops:
 
     def __init__(
         self,
-        grid: Any,  # (k,): times of the run (s), those of its inputs and of its response
-        times: Any,  # (m,): times of the inputs (s)
+        grid: np.ndarray,  # (k,): times of the run (s), those of its inputs and of its response
+        times: np.ndarray,  # (m,): times of the inputs (s)
         inputs: Any,  # (ninputs, m)
         sampled: Any,  # blocks with clocks
         conditions: Known,  # where conditions of t alone change, and how long steps may be

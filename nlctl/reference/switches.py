@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -31,10 +30,10 @@ class Switches:
 
     def __init__(
         self,
-        name: Any,
+        name: str | None,
         label: Callable[[int], tuple[str, str]],  # block and name of a condition
-        ends: Any,  # first and last time of the run (s)
-        tolerances: Any,  # rtol and atol
+        ends: tuple[float, float],  # first and last time of the run (s)
+        tolerances: tuple[float, float],  # rtol and atol
     ) -> None:
         self._name, self._label, self._ends, self._tolerances = name, label, ends, tolerances
         self._last: deque[float] = deque(maxlen=_CROWD)

@@ -33,7 +33,7 @@ class RunArguments:
     times: np.ndarray
     inputs: Any
     initial_state: Any
-    evaluation_times: Any
+    evaluation_times: object
     params: Mapping[str, Any] | None
     progress: Callable[[float], object] | None
     ignore_errors: bool
@@ -47,7 +47,7 @@ class RunArguments:
 HOLDS = ("foh", "zoh")  # first-order and zero-order hold, as python-control calls them
 
 
-def checked_params(params: Any) -> Mapping[str, Any] | None:
+def checked_params(params: object) -> Mapping[str, Any] | None:
     """Return the parameters of a run."""
     if not isinstance(params, Mapping | None):
         raise ParameterError(
@@ -96,7 +96,7 @@ def unified(run: RunArguments) -> RunArguments:
     return replace(run, evaluation_times=wanted, solver=solver | {"solve_ivp_kwargs": keywords})
 
 
-def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) -> np.ndarray:
+def input_array(system: ct.InputOutputSystem, inputs: object, times: np.ndarray) -> np.ndarray:
     """Return the inputs of a run over its m times, of shape (ninputs, m)."""
     count = system.ninputs or 0
     shape = (count, times.size)
@@ -108,7 +108,11 @@ def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) ->
     if (array is None or array.shape != shape) and isinstance(inputs, list | tuple):
         array = _stacked(inputs, times.size)
     if array is None:
-        raise ParameterError(f"inputs need real numbers, got {_short(inputs)}")
+        by_name = isinstance(inputs, Mapping) or callable(inputs)
+        rows = f": give their samples, a row for each of {list(system.input_labels or ())}"
+        raise ParameterError(
+            f"inputs need real numbers, got {_short(inputs)}{rows if by_name else ''}"
+        )
     if array.shape != shape:
         raise ParameterError(f"inputs need shape {shape} for these times, got {array.shape}")
     for i, k in () if np.isfinite(array).all() else np.argwhere(~np.isfinite(array))[:1]:
@@ -138,7 +142,7 @@ def _stacked(entries: Sequence[Any], samples: int) -> np.ndarray:
     return np.vstack(rows) if rows else np.zeros((0, samples))
 
 
-def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.ndarray:
+def state_array(system: ct.InputOutputSystem, initial_state: object = None) -> np.ndarray:
     """Return the initial state of a run, of shape (nstates,)."""
     if initial_state is None or isinstance(initial_state, Mapping):
         return state_of(system, initial_state)
@@ -166,23 +170,23 @@ def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.n
     return x
 
 
-def evaluation_array(evaluation_times: Any, times: np.ndarray) -> np.ndarray:
+def evaluation_array(evaluation_times: object, times: np.ndarray) -> np.ndarray:
     """Return the times at which a response is wanted: those of the inputs if it is "T"."""
     if isinstance(evaluation_times, str) and evaluation_times == "T":
         return times
-    wanted = as_numbers(evaluation_times)
-    if wanted is None or wanted.ndim != 1 or not wanted.size:
+    evaluation = as_numbers(evaluation_times)
+    if evaluation is None or evaluation.ndim != 1 or not evaluation.size:
         raise ParameterError(
             "evaluation_times needs a list of times, or 'T' for timepts, got "
             f"{_short(evaluation_times)}: machine code keeps no steps of its own"
         )
-    if not np.all(np.isfinite(wanted)) or not np.all(np.diff(wanted) > 0):
+    if not np.all(np.isfinite(evaluation)) or not np.all(np.diff(evaluation) > 0):
         raise ParameterError("evaluation_times needs finite times in increasing order")
-    for t in wanted[(wanted < times[0]) | (wanted > times[-1])][:1]:
+    for t in evaluation[(evaluation < times[0]) | (evaluation > times[-1])][:1]:
         raise ParameterError(
             f"evaluation_times has {t:g} s, outside of timepts from {times[0]:g} to {times[-1]:g} s"
         )
-    return wanted
+    return evaluation
 
 
 def held(times: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

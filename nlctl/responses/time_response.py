@@ -95,7 +95,7 @@ class Response(ct.TimeResponseData):
         return self.happened.table()
 
     def plot(
-        self, *args: Any, signals: Sequence[str | Sequence[str]] | None = None, **kwargs: Any
+        self, *args: object, signals: Sequence[str | Sequence[str]] | None = None, **kwargs: object
     ) -> Any:
         """Plot the response as `control.time_response_plot` does, or signals of one kind in a row.
 
@@ -205,7 +205,7 @@ def response_of(
     params: Any,
     form: Mapping[str, Any],
     labels: Labels,
-    **more: Any,
+    **more: object,
 ) -> Response:
     """Return a response of a system."""
     response = Response(

@@ -33,7 +33,9 @@ class Watched:
         """Whether a change of sign counts that rises, or falls."""
         return self.direction == 0 or (self.direction > 0) == rises
 
-    def value(self, t: float, x: np.ndarray, u: np.ndarray, params: Any) -> float:
+    def value(
+        self, t: float, x: np.ndarray, u: np.ndarray, params: Mapping[str, Any] | None
+    ) -> float:
         """Return its value."""
         with np.errstate(all="ignore"):  # what is NaN is reported
             found = np.asarray(self.function(t, x, u, dict(params or {})))
@@ -85,7 +87,7 @@ def nan_watchers(watched: Sequence[Watched]) -> tuple[Watched, ...]:
     """Return functions that fall through 0, and end a run, where those of a run become NaN."""
 
     def sides(each: Watched) -> Callable[..., Any]:
-        def side(t: Any, x: Any, u: Any, params: Any) -> Any:
+        def side(t: object, x: object, u: object, params: object) -> Any:
             value = each.function(t, x, u, params)
             return np.where(value > 0.0, 1.0, np.where(value <= 0.0, 1.0, -1.0))
 
@@ -130,7 +132,7 @@ def _points(times: np.ndarray, states: np.ndarray, inputs: np.ndarray) -> Iterat
     return zip(times, states.T, inputs.T, strict=True)
 
 
-def _watched(name: str, function: Any) -> Watched:
+def _watched(name: str, function: Callable[..., Any]) -> Watched:
     terminal = getattr(function, "terminal", False)
     if not isinstance(terminal, (bool, np.bool_)) and terminal != 1:
         raise ParameterError(
@@ -142,6 +144,6 @@ def _watched(name: str, function: Any) -> Watched:
     return Watched(name=name, function=function, direction=direction, ends=ends)
 
 
-def _name(function: Any, k: int) -> str:
+def _name(function: object, k: int) -> str:
     name = getattr(function, "__name__", "")
     return name if name.isidentifier() else f"event {k + 1}"

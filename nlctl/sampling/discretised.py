@@ -20,7 +20,7 @@ _METHODS = ("euler", "tustin", "zoh")
 
 
 @as_annotated
-def discretise(system: System, dt: float, method: str = "euler") -> Any:
+def discretise(system: System, dt: float, method: str = "euler") -> ct.NonlinearIOSystem:
     """Make a block or diagram in discrete time of one in continuous time.
 
     Parameters
@@ -72,7 +72,7 @@ def with_equations(who: str, system: Any) -> Any:
     return system
 
 
-def _check_equations(who: str, block: Any) -> None:
+def _check_equations(who: str, block: ct.NonlinearIOSystem) -> None:
     """Refuse a block whose equations are not those of states that it has."""
     if sampling_of(block) is not None:
         raise ParameterError(
@@ -119,7 +119,7 @@ def _discretised(system: Any, dt: float, method: str) -> Any:
     return copied
 
 
-def _euler(f: Any, dt: float) -> Any:
+def _euler(f: Callable[..., Any], dt: float) -> Any:
     """Return the forward difference of an equation x' = f(t, x, u, p)."""
 
     def update(t, x, u, p):
@@ -132,7 +132,7 @@ def _euler(f: Any, dt: float) -> Any:
 # -- a diagram with other blocks in the same places -----------------------------------------------
 
 
-def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
+def staged(diagram: ct.InterconnectedSystem, first: object = None, last: object = None) -> Any:
     """Return a diagram whose inputs go through a block of as many, and its outputs as well."""
     connect, given, shown = diagram.connect_map, diagram.input_map, diagram.output_map
     parts = list(diagram.syslist)
@@ -153,7 +153,7 @@ def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
     return reconnected(diagram, parts, (connect, given, shown), diagram.dt)
 
 
-def rebuilt(diagram: Any, change: Callable[[Any], Any], dt: Any) -> Any:
+def rebuilt(diagram: ct.InterconnectedSystem, change: Callable[[Any], Any], dt: object) -> Any:
     """Return a diagram of changed blocks, connected as those of another one are."""
     parts = [
         rebuilt(part, change, dt) if isinstance(part, ct.InterconnectedSystem) else change(part)

@@ -107,7 +107,7 @@ class Sampled(Around):
         return self.sampling.params | self.inner.params
 
     @params.setter
-    def params(self, values: Any) -> None:
+    def params(self, values: object) -> None:
         ours, theirs = self._divided(values or {})
         if ours:
             self.sampling.params = ours
@@ -159,14 +159,14 @@ class Sampled(Around):
         """Whether outputs follow that have waited."""
         return self.delays and Moment(self.sampling, 0) in now
 
-    def override(self, params: Any) -> None:
+    def override(self, params: object) -> None:
         """Divide overrides between the sampling and the block that is sampled."""
         ours, theirs = self._divided(params or {})
         full = {f"{self.sampling.name}.{name}": value for name, value in ours.items()}
         set_parameters(self.sampling, Parameters(full) if ours else None)
         set_parameters(self.inner, theirs)
 
-    def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def rates(self, t: float, x: object, u: object) -> np.ndarray:
         """Return the rates of its states, or the next ones; see `happening`."""
         now = _HAPPENING.get()
         if now is None:
@@ -192,7 +192,7 @@ class Sampled(Around):
 
         return np.concatenate(self.after(now, x, self.oldest(oldest, x, p), computed))
 
-    def _answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _answer(self, t: float, x: object, u: object) -> np.ndarray:
         """Return its outputs; see `happening`."""
         x = np.asarray(x, dtype=float)
         state, _, held = self.parts(x)
@@ -215,17 +215,17 @@ class Sampled(Around):
             return [following, y]
         return [following, y, waiting[: len(waiting) - len(held)], held]
 
-    def oldest(self, function: Any, x: Any, p: Any) -> Any:
+    def oldest(self, function: Callable[..., Any], x: object, p: Any) -> Any:
         """Return the outputs that have waited for the delay, by `oldest` or what stands for it."""
         _, waiting, held = self.parts(x)
         return function(waiting, len(held), p.pending) if self.waiting else held
 
-    def converted(self, function: Any, values: Any, p: Any, which: int) -> Any:
+    def converted(self, function: Callable[..., Any], values: Any, p: Any, which: int) -> Any:
         """Return inputs (0) or outputs (1) behind their converter, by `rounded`."""
         name = self.converters[which]
         return function(values, getattr(p, name)) if name and len(values) else values
 
-    def _new(self, t: float, state: np.ndarray, u: np.ndarray, p: Any) -> np.ndarray:
+    def _new(self, t: float, state: np.ndarray, u: np.ndarray, p: object) -> np.ndarray:
         y = outputs_now(self.inner, t, state, u).astype(float)
         return self.converted(rounded, y, p, 1)
 
@@ -248,7 +248,7 @@ def _own_name(block_name: str) -> str:
     return f"{block_name}.sampling"
 
 
-def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
+def _nothing(t: float, x: object, u: object, params: object) -> Any:
     """Never called: a sampled block asks the block that it samples."""
     raise AssertionError("the equations of a sampled block are those of the block inside")
 
@@ -259,7 +259,7 @@ def rounded(values: Any, quantum: Any) -> Any:
     return np.where(quantum > 0.0, step * np.rint(values / step), values)
 
 
-def oldest(waiting: Any, size: int, pending: Any) -> Any:
+def oldest(waiting: Any, size: int, pending: object) -> Any:
     """Return those of the outputs that wait that a number of samples have come after."""
     count = len(waiting) // size
     outputs = waiting[len(waiting) - size :]
@@ -281,7 +281,7 @@ def sampled(
     output_quantum: float | None = None,
     method: str | None = None,
     waiting: int | None = None,
-) -> Any:
+) -> ct.NonlinearIOSystem:
     """Put a block or diagram in discrete time next to continuous ones: a computer's program.
 
     At t = offset + k dt it samples its inputs, computes, and holds its outputs until the next
@@ -374,7 +374,7 @@ def sampled(
     return _sampled(system, spec, euler)
 
 
-def _refuse_guards(system: Any) -> None:
+def _refuse_guards(system: ct.NonlinearIOSystem) -> None:
     """Refuse blocks whose guards fall in continuous time."""
     for leaf in leaves(system):
         if isinstance(leaf.system, Block) and hasattr(leaf.system.spec, "guard"):
@@ -394,7 +394,7 @@ def _sampled(system: System, spec: Sampling, euler: bool) -> Any:
         return Sampled(system, sampling, euler=euler, delays=delays, converters=(before, behind))
     sampling = block(spec, "sampling")
 
-    def each(part: Any) -> Sampled:
+    def each(part: ct.NonlinearIOSystem) -> Sampled:
         return Sampled(part, sampling, euler=euler and bool(part.nstates))
 
     whole = rebuilt(system, each, dt=0)

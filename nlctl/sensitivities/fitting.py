@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import control as ct
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.stats import t as students_t
 
@@ -121,8 +123,8 @@ class Fit:
 
 @as_annotated
 def fit(
-    diagram: Any,
-    timepts: Any,
+    diagram: ct.NonlinearIOSystem | Compiled,
+    timepts: ArrayLike,
     data: Mapping[str, Any],
     parameters: Mapping[str, Any],
     inputs: Any = 0.0,
@@ -306,7 +308,7 @@ class _Search:
         return np.nan_to_num(np.moveaxis(derivatives, 1, 2)[self._has_datum])
 
 
-def _data(data: Any, times: np.ndarray, sigma: Any) -> dict[str, np.ndarray]:
+def _data(data: Any, times: np.ndarray, sigma: object) -> dict[str, np.ndarray]:
     """Return the data as rows over time."""
     rows = {}
     for name, samples in data.items():
@@ -329,7 +331,7 @@ def _data(data: Any, times: np.ndarray, sigma: Any) -> dict[str, np.ndarray]:
     return rows
 
 
-def _sigmas(data: Mapping[str, np.ndarray], sigma: Any) -> np.ndarray:
+def _sigmas(data: Mapping[str, np.ndarray], sigma: object) -> np.ndarray:
     """Return the noise of each signal."""
     deviations = [sigma[name] if isinstance(sigma, Mapping) else sigma for name in data]
     for name, value in zip(data, deviations, strict=True):

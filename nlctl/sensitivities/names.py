@@ -14,6 +14,7 @@ from ..diagrams import state_names
 from ..errors import CompileError, ParameterError
 from ..names import find_name, unknown
 from ..native import Compiled
+from ..native.diagram.nodes import Node
 from ..native.diagram.wiring import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
 from ..params import declared_params
@@ -93,7 +94,7 @@ def parameters_and_states(given: Mapping[str, Any]) -> tuple[dict[str, Any], dic
     return {n: v for n, v in given.items() if not n.endswith(_AT_START)}, states
 
 
-def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
+def _check_moves(compiled: Compiled, owner: Node, name: str) -> None:
     """Refuse what says when samples are taken, and what arrives when."""
     key = name.rpartition(".")[2]
     if any(owner is node for node in compiled.schedule.samplings):
@@ -108,7 +109,7 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
         )
 
 
-def declared_bounds(owner: Any, name: str) -> tuple[float, float]:
+def declared_bounds(owner: Node, name: str) -> tuple[float, float]:
     """Return between what a block declares that a parameter lies."""
     if not isinstance(owner.system, Block):
         return -np.inf, np.inf
@@ -120,7 +121,7 @@ def declared_bounds(owner: Any, name: str) -> tuple[float, float]:
     return low, high
 
 
-def _checked(what: str, names: Any) -> list[str]:
+def _checked(what: str, names: object) -> list[str]:
     names = [names] if isinstance(names, str) else names
     if not isinstance(names, list | tuple) or not all(isinstance(n, str) for n in names):
         raise ParameterError(f"{what} needs a list of names, got {names!r}")

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from ..expressions.arrays import Tracer, as_array, scalar
-from ..expressions.graph import Expr
+from ..expressions.graph import Expr, Graph
 from ..native import Compiled
 from ..native.diagram.program import Program
 from ..native.equations.blocks import Equations
 from ..native.equations.located import Located
+from ..native.settings import Settings
 from .directions import Direction, SomeRows
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
@@ -51,7 +52,7 @@ def parameters_with(
     quantities: Sequence[VariedQuantity],
     p: np.ndarray,
     scale: np.ndarray,
-    settings: Any,
+    settings: Settings,
     span: tuple[float, float],
 ) -> np.ndarray:
     """Return all parameters of a program with derivatives."""
@@ -289,7 +290,7 @@ class _Maker:
         return samples
 
 
-def _array(graph: Any, expr: Expr, size: int) -> Tracer:
+def _array(graph: Graph, expr: Expr, size: int) -> Tracer:
     """Return an expression as an array."""
     if size == 1:
         return scalar(graph, expr).reshape(1)
@@ -297,7 +298,7 @@ def _array(graph: Any, expr: Expr, size: int) -> Tracer:
 
 
 def _divided(
-    graph: Any, pieces: Sequence[SomeRows], count: int
+    graph: Graph, pieces: Sequence[SomeRows], count: int
 ) -> tuple[list[SomeRows], list[SomeRows]]:
     """Return the first rows of pieces, and the others."""
     single = [(graph.item(e, k), 1) for e, size in pieces for k in range(size)]

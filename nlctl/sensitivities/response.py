@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import control as ct
+from numpy.typing import ArrayLike
+
 from ..annotations import as_annotated
 from ..arguments import tolerances
 from ..native import Compiled, Tableau, compile  # noqa: A004 (what it does)
@@ -18,8 +21,8 @@ from .run import RunWithDerivatives, differentiated_run
 
 @as_annotated
 def sensitivity_response(
-    diagram: Any,
-    timepts: Any,
+    diagram: ct.NonlinearIOSystem | Compiled,
+    timepts: ArrayLike,
     inputs: Any = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
@@ -31,7 +34,7 @@ def sensitivity_response(
     atol: float = 1e-10,
     max_steps: int | None = None,
     max_step: float | None = None,
-    audit: Any = True,
+    audit: object = True,
 ) -> SensitivityResponse:
     """Simulate a diagram together with its derivatives by parameters and initial states.
 

@@ -49,7 +49,7 @@ class Extended:
         return self.layout[self.owner][name]
 
 
-def stand_in(system: Any, states: int, outputs: int) -> Any:
+def stand_in(system: ct.NonlinearIOSystem, states: int, outputs: int) -> Any:
     """Return a system that says how many states and outputs a program has."""
     return ct.NonlinearIOSystem(
         _nothing,
@@ -62,7 +62,7 @@ def stand_in(system: Any, states: int, outputs: int) -> Any:
     )
 
 
-def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
+def _nothing(t: float, x: object, u: object, params: object) -> Any:
     """What a system computes that only says how large it is."""
     return np.zeros(0)
 

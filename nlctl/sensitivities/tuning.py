@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import control as ct
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from ..annotations import as_annotated
@@ -68,8 +69,8 @@ def tune(
     space: Mapping[str, Any] | SpaceLike,
     spec: RequirementsLike | Sequence[MetricLike] | MetricLike,
     budget: float = 200,
-    timepts: Any = None,
-    inputs: Any = 0.0,
+    timepts: ArrayLike | None = None,
+    inputs: object = 0.0,
     initial_state: Mapping[str, float] | None = None,
     *,
     cost: MetricLike | None = None,
@@ -289,7 +290,10 @@ def _history(runs: Runs) -> Any:
 
 
 def _problem(
-    diagram: Any, what: tuple[Any, ...], given: tuple[Any, ...], how: dict[str, Any]
+    diagram: ct.NonlinearIOSystem | Compiled,
+    what: tuple[Any, ...],
+    given: tuple[Any, ...],
+    how: dict[str, Any],
 ) -> tuple[TuningProblem, np.ndarray]:
     """Return what is asked of runs, and the gains to start from."""
     (space, spec, cost, samples), (timepts, inputs, initial_state, params) = what, given
@@ -334,7 +338,7 @@ def _margins(spec: Any, cost: Any) -> tuple[MetricLike, ...]:
     return metrics
 
 
-def _times(timepts: Any, margins: Sequence[Any]) -> np.ndarray:
+def _times(timepts: object, margins: Sequence[Any]) -> np.ndarray:
     """Return when signals are sampled."""
     if timepts is not None:
         times = checked_times(timepts)
@@ -371,7 +375,7 @@ def _bounds(space: Any) -> list[tuple[str, Any]]:
     return rows
 
 
-def _present_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str, float]:
+def _present_values(diagram: Compiled, params: Any, initial_state: object) -> dict[str, float]:
     """Return what parameters and initial states are before anything is tuned."""
     p = diagram.parameter_vector(params)
     present = {name: float(p[place]) for name, (place, _) in float_parameters(diagram).items()}
@@ -380,7 +384,7 @@ def _present_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[
 
 
 def _row(
-    diagram: Compiled, name: str, value: Any, present: Mapping[str, float]
+    diagram: Compiled, name: str, value: object, present: Mapping[str, float]
 ) -> tuple[str, float, float, float]:
     """Return the full name of a gain, where its search starts, and its bounds."""
     full = name if name in present else find_name("parameter", name, present)

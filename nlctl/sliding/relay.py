@@ -116,7 +116,7 @@ class IdealRelay:
 
     @staticmethod
     @equation
-    def update(t: float, x: Any, u: Any, p: Any) -> Any:
+    def update(t: float, x: object, u: object, p: object) -> Any:
         """The mode changes at events only."""
         return (0.0,)
 
@@ -133,7 +133,7 @@ class IdealRelay:
 
     @staticmethod
     @equation
-    def commit(t: float, x: Any, u: Any, p: Any) -> Any:
+    def commit(t: float, x: Any, u: object, p: object) -> Any:
         """The mode."""
         (mode,) = x
         return (relay_mode(u, mode, p),)

@@ -23,7 +23,7 @@ RESOLVED = ("_current_params",)
 """Attributes that a run writes into a system."""
 
 
-def set_parameters(system: Any, params: Mapping[str, Any] | None) -> None:
+def set_parameters(system: ct.NonlinearIOSystem, params: Mapping[str, Any] | None) -> None:
     """Let a system's equations have these overrides from now on; None for its own values."""
     system._update_params(params)
 
@@ -60,7 +60,7 @@ def rates_and_outputs_now(
     return _rates_of_parts(system, t, x, inputs), _without_zeros(system.output_map, outputs)
 
 
-def _is_plain_diagram(system: Any) -> bool:
+def _is_plain_diagram(system: object) -> bool:
     if not isinstance(system, ct.InterconnectedSystem):
         return False
     names = ("_rhs", "_out", "_compute_static_io")
@@ -70,7 +70,9 @@ def _is_plain_diagram(system: Any) -> bool:
     )
 
 
-def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+def _rates_of_parts(
+    system: ct.InterconnectedSystem, t: float, x: np.ndarray, inputs: np.ndarray
+) -> np.ndarray:
     rates = np.zeros(system.nstates or 0)
     for part, states, given, _ in _places_of_parts(system):
         if part.nstates:
@@ -79,7 +81,7 @@ def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) ->
 
 
 def _signals_now(
-    system: Any, t: float, x: np.ndarray, u: np.ndarray
+    system: ct.InterconnectedSystem, t: float, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return inputs and outputs of all parts: python-control's, or ours where it finds none."""
     # python-control's first pass has inputs of 0, and it multiplies every output by every
@@ -105,7 +107,7 @@ def _outputs_if_settled(part: Any, t: float, x: np.ndarray, u: np.ndarray) -> np
 
 
 def _settled_signals(
-    system: Any, t: float, x: np.ndarray, u: np.ndarray,
+    system: ct.InterconnectedSystem, t: float, x: np.ndarray, u: np.ndarray,
     answer: Callable[[Any, float, np.ndarray, np.ndarray], np.ndarray | None] = _outputs_if_settled,
     product: Callable[[Any, Any], np.ndarray] = np.matmul, equal_nan: bool = False,
 ) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
@@ -131,7 +133,7 @@ def _settled_signals(
     return None
 
 
-def _places_of_parts(system: Any) -> Iterator[tuple[Any, slice, slice, slice]]:
+def _places_of_parts(system: ct.InterconnectedSystem) -> Iterator[tuple[Any, slice, slice, slice]]:
     """Yield the parts of a diagram, with the places of their states, inputs and outputs."""
     n = m = k = 0
     for part in system.syslist:
@@ -140,7 +142,7 @@ def _places_of_parts(system: Any) -> Iterator[tuple[Any, slice, slice, slice]]:
         n, m, k = ends
 
 
-def _without_zeros(matrix: Any, values: Any) -> np.ndarray:
+def _without_zeros(matrix: object, values: object) -> np.ndarray:
     """Return a product with a matrix whose zeros stay zeros, also times NaN."""
     matrix = np.asarray(matrix)
     return np.sum(np.where(matrix == 0, 0.0, matrix * np.asarray(values)), axis=1)
@@ -167,14 +169,14 @@ class OwnParameters(ct.NonlinearIOSystem):
         """Return what the equations get, of the overrides of a run."""
         raise NotImplementedError
 
-    def _answer(self, t: float, x: Any, u: Any) -> Any:
+    def _answer(self, t: float, x: object, u: object) -> Any:
         """Return its outputs, with the parameters that it has now."""
         return super()._out(t, x, u)
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
         self._current_params = type(self)._taken(self, params or {})
 
-    def _out(self, t: float, x: Any, u: Any) -> Any:
+    def _out(self, t: float, x: object, u: object) -> Any:
         return type(self)._answer(self, t, x, u)  # an object of others may have one of its own
 
 
@@ -187,11 +189,11 @@ class Around(ct.NonlinearIOSystem):
     inner: Any
     sampling: Any
 
-    def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def rates(self, t: float, x: object, u: object) -> np.ndarray:
         """Return its derivatives."""
         raise NotImplementedError
 
-    def _answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _answer(self, t: float, x: object, u: object) -> np.ndarray:
         """Return its outputs."""
         raise NotImplementedError
 
@@ -207,13 +209,13 @@ class Around(ct.NonlinearIOSystem):
         return current_parameters(self.inner)
 
     @_current_params.setter
-    def _current_params(self, values: Any) -> None:
+    def _current_params(self, values: object) -> None:
         """Nothing: they are those of the system inside, which has them already."""
 
-    def _rhs(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _rhs(self, t: float, x: object, u: object) -> np.ndarray:
         return self.rates(t, x, u)
 
-    def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _out(self, t: float, x: object, u: object) -> np.ndarray:
         return self._answer(t, x, u)
 
 
@@ -237,10 +239,10 @@ class StandIn(ct.InputOutputSystem):
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
         set_parameters(self.system, params)
 
-    def _rhs(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _rhs(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         return rates_now(self.system, t, x, u)
 
-    def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _out(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         return outputs_now(self.system, t, x, u)
 
 
@@ -256,7 +258,7 @@ def takes_a_dict(system: Any) -> bool:
 
 
 def state_space(
-    matrices: tuple[np.ndarray, ...], dt: Any, names: Mapping[str, Any]
+    matrices: tuple[np.ndarray, ...], dt: object, names: Mapping[str, Any]
 ) -> ct.StateSpace:
     """Return the linear system of A, B, C and D; control.StateSpace refuses most without inputs."""
     A, B, C, D = matrices

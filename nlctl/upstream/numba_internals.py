@@ -77,20 +77,20 @@ def processor() -> tuple[Any, ...]:
 class CodeCache(NullCache):
     """What a dispatcher asks for code before it compiles a signature, and gives it afterwards."""
 
-    def load(self, signature: Any) -> Any:
+    def load(self, signature: object) -> Any:
         """Return what `save` was given for a signature, None if there is nothing."""
         raise NotImplementedError
 
-    def save(self, signature: Any, data: Any) -> None:
+    def save(self, signature: object, data: object) -> None:
         """Keep code that means the same in another process; it is plain data."""
         raise NotImplementedError
 
-    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+    def load_overload(self, sig: object, target_context: object) -> CompileResult | None:
         """Return code for numba."""
         data = self.load(sig)
         return None if data is None else _rebuilt(data, target_context)
 
-    def save_overload(self, sig: Any, cres: CompileResult) -> None:
+    def save_overload(self, sig: object, cres: CompileResult) -> None:
         """Take code from numba; that with addresses of this process is not kept."""
         if not cres.library.has_dynamic_globals and not cres.lifted:
             self.save(sig, cres._reduce())
@@ -132,7 +132,7 @@ def own_ir() -> Iterator[dict[int, list[str]]]:
     texts: dict[int, list[str]] = {}
     add = CPUCodeLibrary.add_ir_module
 
-    def keep(self: Any, module: Any) -> None:
+    def keep(self: Any, module: object) -> None:
         texts.setdefault(id(self), []).append(normalize_ir_text(str(module)))
         add(self, module)
 

@@ -36,6 +36,11 @@ class System(Protocol):
 class SystemResponse(Protocol):
     """A response of one: `control.TimeResponseData`, and what nlctl makes of it."""
 
+    t: Any  # attributes that are set after they were None
+    x: Any
+    y: Any
+    u: Any
+
     @property
     def time(self) -> np.ndarray: ...
     @property

@@ -79,7 +79,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
     ],
     "nlctl.expressions": [
         ["signs"],
-        ["graph", "source"],
+        ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["arrays", "operators", "masked", "indexing", "edges"],
         ["sharp", "without_poles"],

@@ -24,7 +24,7 @@ def interpreted(compiled):
         return lowered.size, *plain_functions(lowered)
 
     def prepared(p):
-        size, prepare, rhs, out = functions(p.tobytes())
+        size, prepare, rhs, out, *_ = functions(p.tobytes())
         c = np.full((size, 1), np.nan)
         prepare(p[:, None], c)
         return c, rhs, out

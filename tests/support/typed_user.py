@@ -7,7 +7,7 @@ import numpy as np
 import nlctl
 from nlctl.analysis.lyapunov import certify, examine
 from nlctl.analysis.metrics import rms
-from nlctl.analysis.robustness import Spec, always, in_band, margin
+from nlctl.analysis.robustness import Requirement, Spec, always, in_band, margin
 from nlctl.analysis.studies import load_result, read_study, run
 
 
@@ -43,5 +43,14 @@ linear, members = compiled.linearize({"plant.x1": 0.5}), nlctl.ensemble_response
 print(linear, members.signals, members.table.shape, nlctl.block(SoftSaturation(), "one"))
 print(nlctl.parameters(loop).shape, nlctl.typeset(loop), nlctl.initial_state(loop))
 print(certify(loop).holds, examine(loop), always(in_band("e", upper=0.2)), Spec, margin)
+gains = {"law.beta": (1.0, 4.0)}
+tracks = Requirement(key="tracks", formula=always(in_band("e", upper=0.2)), until=20)
+slopes = nlctl.sensitivity_response(loop, times, with_respect_to="law.beta")
+fitted = nlctl.fit(loop, times, {"e": response.outputs[0]}, {"law.beta": 1.0})
+tuned = nlctl.tune(loop, gains, Spec(requirements=(tracks,)))
+print(slopes["e", "law.beta"].shape, fitted["law.beta"], fitted.values, tuned)
+law = nlctl.sampled(nlctl.PID2(), 0.01, method="euler")
+print(law, nlctl.discretise(nlctl.block(nlctl.Lag(), "lag"), 0.01), nlctl.draw(loop))
+print(nlctl.frequency_response(loop, [1.0]), nlctl.find_operating_point(loop), members.plot())
 result = run(read_study("arm.toml"), "reports/arm")
 print(result.verdict, load_result("reports/arm").rows)

@@ -146,7 +146,7 @@ class Plain:
             read = self.compiled.schedule
             found = equations(read, self.compiled.program.layout, p[:, 0])
             lowered = lower(read, self.compiled.program, lanes, found)
-        prepare, rhs, out = plain_functions(lowered)
+        prepare, rhs, out, *_ = plain_functions(lowered)
         rows = {**lowered.rows, "c": lowered.size, "y": self.system.noutputs or 0}
         c, dx, g, m, y = (np.full((rows[k], lanes), np.nan) for k in ("c", "dx", "g", "m", "y"))
         prepare(p, c)

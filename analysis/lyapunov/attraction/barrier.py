@@ -20,6 +20,7 @@ from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
+from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
 from ...intervals.box import Box, face_of_box
@@ -143,7 +144,7 @@ class _Problem:
 
 @as_annotated
 def barrier(
-    system: Any,
+    system: System,
     box: Box,
     *,
     start: Box | _StateFunction,
@@ -260,7 +261,7 @@ def _check_boxes(box: Box, start: Any, unsafe: Sequence[Any]) -> None:
 
 
 def _in_the_box(
-    motion: StateRates, box: Box, start: Any, unsafe: Sequence[Any], degree: int, max_boxes: int
+    motion: StateRates, box: Box, start: object, unsafe: Sequence[Any], degree: int, max_boxes: int
 ) -> dict[str, Any]:
     problem = _problem(motion, box, start, unsafe, degree)
     coefficients, boxes, reason = np.zeros(len(problem.terms)), 0, ""
@@ -276,7 +277,7 @@ def _in_the_box(
 
 
 def _problem(
-    motion: StateRates, box: Box, start: Any, unsafe: Sequence[Any], degree: int
+    motion: StateRates, box: Box, start: object, unsafe: Sequence[Any], degree: int
 ) -> _Problem:
     n = motion.order
     terms = tuple(monomial_terms(n, degree))

@@ -30,7 +30,7 @@ def inequality_of(function: Callable[[Any], Any], sides: int) -> Expr:
 
 
 def safe_everywhere(
-    motion: StateRates, box: Box, start: Any, unsafe: Sequence[Any], degree: int, max_boxes: int
+    motion: StateRates, box: Box, start: object, unsafe: Sequence[Any], degree: int, max_boxes: int
 ) -> dict[str, Any]:
     """Prove it by sums of squares; there are no boxes."""
     ring = fmpq_mpoly_ctx.get(motion.names, Ordering.lex)

@@ -21,6 +21,7 @@ from nlctl.native.compiled import Compiled
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of
 from nlctl.native.enclosures.rates import state_rates, with_leaves
 from nlctl.upstream.numba_internals import is_jit_disabled
+from nlctl.upstream.systems import System
 
 from ...intervals.box import Box
 
@@ -75,7 +76,7 @@ class StateRates:
 
 def motion_of(
     who: str,
-    system: Any,
+    system: System,
     box: Box,
     params: Mapping[str, Any] | None = None,
     *,

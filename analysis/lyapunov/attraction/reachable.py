@@ -17,6 +17,7 @@ from nlctl.errors import ParameterError
 from nlctl.expressions.graph import Untraceable
 from nlctl.native.tubes.series import SeriesCode, series_code
 from nlctl.native.tubes.tube import LEAVES, MUST_LEAVE, REACHED, Tube, tube_from
+from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
 from ...intervals.box import Box
@@ -83,7 +84,7 @@ class ReachableSet:
 
 @as_annotated
 def reachable_set(
-    system: Any,
+    system: System,
     start: Box,
     horizon: float,
     *,
@@ -175,7 +176,7 @@ def reachable_set(
     )  # fmt: skip
 
 
-def _limits(names: Sequence[str], within: Any) -> np.ndarray:
+def _limits(names: Sequence[str], within: object) -> np.ndarray:
     """Return where each state shall stay, shape (n, 2)."""
     limits = np.array([[-np.inf, np.inf]] * len(names))
     if within is None:

@@ -13,6 +13,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
+from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
 from ...intervals.box import Box
@@ -77,10 +78,10 @@ class AttractionRegion(ProofResult):
 
 @as_annotated
 def region_of_attraction(
-    system: Any,
+    system: System,
     box: Box,
     *,
-    P: Any = None,
+    P: object = None,
     at: Sequence[float] | None = None,
     params: Mapping[str, Any] | None = None,
     tol: float = 1e-4,
@@ -209,7 +210,7 @@ def _check_linear_part(A: np.ndarray) -> None:
         )
 
 
-def _positive_definite(P: Any, n: int) -> np.ndarray:
+def _positive_definite(P: object, n: int) -> np.ndarray:
     """Return a matrix that the user has given."""
     matrix = np.asarray(P, dtype=float)
     symmetric = matrix.shape == (n, n) and np.array_equal(matrix, matrix.T)

@@ -53,7 +53,7 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
     number("clipped_split", "k_1", k_1, above=0)
     number("clipped_split", "k_2", k_2, at_least=k_1)
 
-    def part(u: Any, v: Any) -> Any:
+    def part(u: Any, v: object) -> Any:
         one, other = k_1 * u, k_2 * u
         return clip(v, np.minimum(one, other), np.maximum(one, other))
 
@@ -84,7 +84,7 @@ def eps_range(
     return low, low if edges[1] is edges[0] else along(edges[1])
 
 
-def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
+def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: object, t: object) -> Any:
     """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t)."""
     # v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and
     # what lies between 0 and v(0, t). Between v and its clipped self intervals forget that t is one

@@ -69,7 +69,7 @@ class Decomposition:
         """Bound eps_u* of |eps_u|."""
         return float(np.maximum(abs(self.eps_low), abs(self.eps_high)))
 
-    def eps_u(self, u: Any, v: Any) -> Any:
+    def eps_u(self, u: object, v: object) -> Any:
         """Return eps_u = v - k u for input u and output v.
 
         Parameters
@@ -84,7 +84,7 @@ class Decomposition:
         """
         return v - self.part(u, v)
 
-    def gain(self, u: Any, v: Any) -> Any:
+    def gain(self, u: object, v: object) -> Any:
         """Return k for input u and output v; k_1 at u = 0, where it has no effect.
 
         Parameters
@@ -102,7 +102,7 @@ class Decomposition:
         return np.where(u == 0, self.k_1, k)
 
 
-def check_gain(who: str, k: Any) -> None:
+def check_gain(who: str, k: object) -> None:
     """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none."""
     bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
     if bounds is not None and (bounds.size != 2 or not 0 < bounds[0] <= bounds[1]):
@@ -111,7 +111,11 @@ def check_gain(who: str, k: Any) -> None:
 
 @as_annotated
 def decompose(
-    actuator: Any, *, k: tuple[float, float] | None = None, u_max: float = 60.0, tol: float = 1e-4
+    actuator: Any,
+    *,
+    k: tuple[float, float] | None = None,
+    u_max: float = 60.0,
+    tol: float = 1e-4,
 ) -> Decomposition:
     """Split an actuator as v = k u + eps_u and bound k and eps_u.
 
@@ -166,7 +170,7 @@ def decompose(
     return _proved_split(actuator, k, u_max, tol)
 
 
-def _refuse_by_itself(actuator: Any) -> None:
+def _refuse_by_itself(actuator: object) -> None:
     """Refuse an actuator whose record says why it has no split."""
     why = getattr(actuator, "no_split", None)
     if why is not None:
@@ -174,7 +178,7 @@ def _refuse_by_itself(actuator: Any) -> None:
         raise DecompositionError(f"{name} is not of the form (2): {why}; replace the actuator")
 
 
-def _own_gains(actuator: Any) -> tuple[float, float]:
+def _own_gains(actuator: object) -> tuple[float, float]:
     """Return the bounds of k that a record knows."""
     name = type(actuator).__name__
     k = getattr(actuator, "gains", None)
@@ -207,7 +211,7 @@ def _declared_split(actuator: Any, u_max: float, tol: float) -> Decomposition:
     return dataclasses.replace(proved, eps_low=low, eps_high=high)
 
 
-def only_declared(what: str, actuator: Any) -> str:
+def only_declared(what: str, actuator: object) -> str:
     """Say that something follows from a split which a record declares, and nothing proves."""
     return (
         f"{what} would follow from the split (2) that {type(actuator).__name__} declares; samples "
@@ -244,7 +248,7 @@ def _textbook_dead_zone(zone: DeadZone) -> Decomposition:
     left = zone.slope_l + abs(zone.ripple_l)
     least = min(zone.slope_r - abs(zone.ripple_r), zone.slope_l - abs(zone.ripple_l))
 
-    def part(u: Any, v: Any) -> Any:
+    def part(u: object, v: object) -> Any:
         u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
         inside = (zone.b_l <= u) & (u <= zone.b_r)
         distance = np.where(u > 0, u - zone.b_r, u - zone.b_l)
@@ -305,7 +309,7 @@ def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: floa
     )
 
 
-def _is_of_nlctl(actuator: Any) -> bool:
+def _is_of_nlctl(actuator: object) -> bool:
     """Whether it is one of nlctl's own records, whose bands its tests hold to."""
     return getattr(actuators, type(actuator).__name__, None) is type(actuator)
 
@@ -352,7 +356,7 @@ def _edges(actuator: Any) -> tuple[Edge, Edge]:
 
 
 def _refuse_growth(
-    actuator: Any,
+    actuator: object,
     k: tuple[float, float],
     u_max: float,
     reach: tuple[tuple[Range, Range], tuple[Range, Range]],

@@ -34,7 +34,7 @@ class Gains:
     b: float = 0.0
 
 
-def total_error(G_max: Any, eps_u: Any, d: Any, eps: Any) -> Any:
+def total_error(G_max: Any, eps_u: Any, d: object, eps: object) -> Any:
     """Return delta* = G_max eps_u* + d* + eps*, the bound of all errors in (20)."""
     return G_max * eps_u + d + eps
 
@@ -67,7 +67,7 @@ def initial_V(gains: Gains, delta: Any, W_error_squared: Any) -> Any:  # noqa: N
     )
 
 
-def final_bound(alpha_0: Any, alpha_1: float, V_0: Any, Q: float) -> Any:
+def final_bound(alpha_0: Any, alpha_1: float, V_0: object, Q: float) -> Any:
     """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0."""
     # With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
     return np.sqrt(2 * (alpha_0 / alpha_1 + V_0 + Q))

@@ -93,7 +93,7 @@ def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, A
     return lambda x, v: f(x, v, p), lambda x, t: d(x, t, p)
 
 
-def _refusal(plant: Any) -> Callable[[str], DiagramError]:
+def _refusal(plant: object) -> Callable[[str], DiagramError]:
     return lambda why: DiagramError(
         f"f and d of {type(plant).__name__} are not what they are of numbers: {why}"
     )

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from nlctl.attributes import described_record
@@ -146,7 +147,11 @@ def _side(name: str, count: int, low: float, high: float) -> str:
 
 
 def read_starts(
-    loop: Any, starts: Any, *, free: tuple[str, ...] = (), kept: tuple[str, ...] = ()
+    loop: ct.InterconnectedSystem,
+    starts: object,
+    *,
+    free: tuple[str, ...] = (),
+    kept: tuple[str, ...] = (),
 ) -> Starts:
     """Return the set of initial states that `certify` was asked for."""
     names, x0 = tuple(state_names(loop)), initial_state(loop)
@@ -169,7 +174,7 @@ def read_starts(
     return Starts(names=names, low=low, high=high, level=level, kept=unnamed)
 
 
-def _level(value: Any, free: tuple[str, ...]) -> float:
+def _level(value: object, free: tuple[str, ...]) -> float:
     if not free:
         raise ParameterError(
             "certify takes a level of V for loops with a reference model only: here V depends on "
@@ -181,7 +186,7 @@ def _level(value: Any, free: tuple[str, ...]) -> float:
     return float(number)
 
 
-def _members(name: Any, names: tuple[str, ...]) -> list[str]:
+def _members(name: object, names: tuple[str, ...]) -> list[str]:
     """Return the state of that name, or all of a vector."""
     bases = dict.fromkeys(_INDEX.sub("", state) for state in names)
     choices = dict.fromkeys(names) | bases
@@ -189,7 +194,7 @@ def _members(name: Any, names: tuple[str, ...]) -> list[str]:
     return [full] if full in names else [s for s in names if _INDEX.sub("", s) == full]
 
 
-def _ends(name: Any, value: Any) -> tuple[float, float]:
+def _ends(name: object, value: object) -> tuple[float, float]:
     numbers = as_numbers(value)
     size = None if numbers is None else numbers.size
     if numbers is None or size not in (1, 2) or not np.all(np.isfinite(numbers)):

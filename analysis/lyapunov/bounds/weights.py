@@ -189,7 +189,7 @@ def _cost_of_weights(gains: Gains, delta_rest: float) -> tuple[np.ndarray, np.nd
 
 @as_annotated
 def approximation_error(
-    plant: Any, basis: Any, W: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000
+    plant: Any, basis: Any, W: object, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000
 ) -> Range:
     """Prove the range of eps(x) = g(x) - W^T psi(x) over a box, (19).
 

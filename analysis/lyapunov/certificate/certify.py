@@ -156,7 +156,7 @@ def certify(
     ))  # fmt: skip
 
 
-def _refuse_others(loop: Any) -> None:
+def _refuse_others(loop: object) -> None:
     """Refuse a loop whose law is none that there is a proof for."""
     for place in leaves(loop) if isinstance(loop, ct.InterconnectedSystem) else ():
         spec = record_of(place)
@@ -164,5 +164,6 @@ def _refuse_others(loop: Any) -> None:
             laws = ", ".join(kind.about for kind in PROOFS if kind.fits is not None)
             raise DiagramError(
                 f"certify has proofs for {laws}, got {type(spec).__name__} as "
-                f"'{place.path}' and no ReferenceModel"
+                f"'{place.path}' and no ReferenceModel: nlctl.mrac, nlctl.sliding_mode and "
+                "nlctl.adaptive_neural(order, law=nlctl.controllers.KnownSignLaw()) make such loops"
             )

@@ -14,8 +14,10 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number
 from nlctl.attributes import described_record
 from nlctl.errors import DivergedError, ParameterError
+from nlctl.native import Compiled
 from nlctl.native import compile as compiled_loop
 from nlctl.response import input_output_response
+from nlctl.upstream.systems import System
 
 from ...metrics import peak
 from ..bounds.decomposition import decompose
@@ -81,7 +83,7 @@ class GainDesign:
 
 @as_annotated
 def design(
-    loop: Any,
+    loop: System,
     *,
     u_limit: float,
     k: tuple[float, float] | None = None,
@@ -205,7 +207,9 @@ def _bound(loop: KnownSignLoop, table: list[Demand]) -> tuple[float, float]:
     return C, 0.0
 
 
-def _largest_input(compiled: Any, gains: dict[str, float], horizon: float, max_steps: int) -> float:
+def _largest_input(
+    compiled: Compiled, gains: dict[str, float], horizon: float, max_steps: int
+) -> float:
     times = np.linspace(0.0, horizon, round(horizon / 1e-3) + 1)
     try:
         run = input_output_response(
@@ -218,7 +222,7 @@ def _largest_input(compiled: Any, gains: dict[str, float], horizon: float, max_s
 
 
 def _proved(
-    loop: Any, trials: list[GainCandidate], u_limit: float, how: dict[str, Any], horizon: float
+    loop: System, trials: list[GainCandidate], u_limit: float, how: dict[str, Any], horizon: float
 ) -> GainDesign:
     """Prove the best trial that keeps the limit; if that fails, the next one."""
     allowed = [t for t in trials if np.isfinite(t.C_0) and t.u <= u_limit]

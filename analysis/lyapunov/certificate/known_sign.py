@@ -23,6 +23,7 @@ from flint import arb
 from nlctl import controllers
 from nlctl.attributes import described_record
 from nlctl.references import SumOfSines
+from nlctl.upstream.systems import System
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
@@ -129,7 +130,7 @@ def read_known_sign(loop: Any, given: Supposed = NOTHING_SUPPOSED) -> KnownSignL
     )
 
 
-def _begin(loop: Any, options: ProofOptions) -> Subject:
+def _begin(loop: System, options: ProofOptions) -> Subject:
     return filtered.subject_of(read_known_sign(loop, options), options, options.u_max)
 
 

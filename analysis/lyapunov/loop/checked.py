@@ -29,7 +29,9 @@ from .same_loop import check_same, points_around
 ADDED = "declared bounds of external inputs, times their gains"
 
 
-def bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:
+def bound_of_inputs(
+    roles: Roles, inputs: Mapping[str, float], loop: ct.InterconnectedSystem
+) -> float:
     """Return the bound of what external inputs add to v."""
     for name, value in inputs.items():
         if name not in roles.disturbances:
@@ -99,7 +101,7 @@ class CheckedLoop:
 
 
 def read_checked(
-    loop: Any,
+    loop: ct.InterconnectedSystem,
     pieces: Pieces,
     kinds: Mapping[str, tuple[type, ...]],
     given: Supposed,
@@ -131,13 +133,13 @@ def read_checked(
     )  # fmt: skip
 
 
-def _states(loop: Any, roles: Roles, part: str) -> tuple[str, ...]:
+def _states(loop: ct.InterconnectedSystem, roles: Roles, part: str) -> tuple[str, ...]:
     """Return the states of a part, by path."""
     place = roles.places[part]
     return tuple(state_names(loop)[place.state_offset :][: place.system.nstates or 0])
 
 
-def _compared_at(loop: Any, starts: Starts) -> list[tuple[float, np.ndarray]]:
+def _compared_at(loop: ct.InterconnectedSystem, starts: Starts) -> list[tuple[float, np.ndarray]]:
     """Return times and states: around the loop's own start, and the corners of all starts."""
     points = points_around(initial_state(loop))
     return points if starts.is_point else points + [(0.0, x) for x in starts.points()]

@@ -70,7 +70,7 @@ def loop_content(
     )
 
 
-def _is_plain(system: Any) -> bool:
+def _is_plain(system: object) -> bool:
     """Whether a system computes what its class, its maps and its record say, and nothing else."""
     fields = {name: value for name, value in vars(system).items() if name not in _RECORDS}
     update, output = fields.pop("updfcn", None), fields.pop("outfcn", None)

@@ -37,11 +37,11 @@ class Acceleration:
     p: Any = field(compare=False)
     content: object
 
-    def __call__(self, t: Any, x: Any, v: Any) -> Any:
+    def __call__(self, t: object, x: object, v: object) -> Any:
         """Return it of balls or numbers."""
         return self.update(t, _objects(x), _objects((v,)), self.p)[-1]
 
-    def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: Any) -> Expr:
+    def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: object) -> Expr:
         """Return it of symbols, as an expression of the graph; Untraceable if there is none."""
         system = self.plant.system
         try:

@@ -26,6 +26,7 @@ from nlctl.native.diagram.checks import check_functions, check_sizes
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import Around
+from nlctl.upstream.systems import System
 
 from ..bounds.final_bound import Gains
 from .content import Remembered
@@ -70,7 +71,7 @@ def record_of(place: Place) -> Any:
     return place.system.current_spec if type(place.system) is Block else None
 
 
-def has_law(loop: Any, law: type) -> bool:
+def has_law(loop: System, law: type) -> bool:
     """Whether a diagram has a block with such a record."""
     return isinstance(loop, ct.InterconnectedSystem) and any(
         isinstance(record_of(place), law) for place in leaves(loop)
@@ -84,12 +85,15 @@ def declared(place: Place, kind: str) -> list[str]:
     return list(labels if spec is None else getattr(spec, kind))
 
 
-def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
+def read_roles(loop: object, pieces: Pieces = PIECES, content: str = "") -> Roles:
     """Find the blocks of a closed loop and check every wire between them."""
     # `content` is a key of its functions: which ones were read before is remembered.
     diagram = isinstance(loop, ct.InterconnectedSystem)
     if not diagram or (pieces is PIECES and "r" not in loop.output_labels):
-        raise DiagramError("the proof needs a closed loop, a diagram with the output r")
+        raise DiagramError(
+            "the proof needs a closed loop, a diagram with the output r, which is the filtered "
+            "error of a controller such as nlctl.adaptive_neural"
+        )
     wiring = Wiring(loop)
     _check_blocks(loop, wiring)
     if content not in _PURE:
@@ -106,7 +110,7 @@ def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
     return Roles(places=places, disturbances=disturbances)
 
 
-def _check_blocks(loop: Any, wiring: Wiring) -> None:
+def _check_blocks(loop: System, wiring: Wiring) -> None:
     """Continuous time, no block that remembers or changes something, no states left out."""
     check_sizes(loop, (place.system for place in wiring.blocks))
     for place in (wiring.top, *wiring.blocks):
@@ -289,7 +293,7 @@ def joined_again(
     """Return copies of a loop's blocks that are connected by the names that the records declare."""
     parts = {place.path: part for part, place in roles.places.items()}
 
-    def copied(diagram: Any, path: str) -> Iterator[Any]:
+    def copied(diagram: ct.InterconnectedSystem, path: str) -> Iterator[Any]:
         for system in diagram.syslist:
             here = f"{path}{system.name}"
             if isinstance(system, ct.InterconnectedSystem):

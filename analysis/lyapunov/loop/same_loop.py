@@ -93,7 +93,7 @@ def _comparisons(content: LoopContent, points: list[_Point]) -> list[str]:
     return [key and text_key(key + where) for key in (content.key, content.functions)]
 
 
-def _step(given: Any, understood: Any, comparisons: list[str], count: int) -> int:
+def _step(given: object, understood: object, comparisons: list[str], count: int) -> int:
     """Return the step from a point that is still to be compared to the next."""
     if comparisons[0] in _AGREED:
         return max(count, 1)

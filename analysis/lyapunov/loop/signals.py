@@ -14,6 +14,7 @@ from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import check_known
+from nlctl.upstream.systems import SystemResponse
 
 POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
 INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
@@ -58,7 +59,7 @@ class Signals:
 
 
 @as_annotated
-def signals_of(response: Any) -> Signals:
+def signals_of(response: SystemResponse | Signals) -> Signals:
     """Return the outputs of a response by name.
 
     Parameters
@@ -157,8 +158,8 @@ def inequality(
     equation: str,
     statement: str,
     t: np.ndarray,
-    low: Any,
-    high: Any,
+    low: object,
+    high: object,
     scale: float | None = None,
     tolerance: float = POINTWISE,
 ) -> Margin:

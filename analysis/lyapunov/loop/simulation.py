@@ -26,6 +26,7 @@ from nlctl.errors import AlgebraicLoopError, DiagramError, ParameterError
 from nlctl.references import derivative_names
 from nlctl.response import input_output_response
 from nlctl.upstream.control_internals import outputs_now, rates_now
+from nlctl.upstream.systems import SystemResponse
 from nlctl.wording import counted
 
 from ...response_of_loop import own_parameters
@@ -78,7 +79,7 @@ class MemberRun:
 
 def members_of(
     loop: ct.InterconnectedSystem,
-    run: Any,
+    run: object,
     step: float,
     start: Mapping[str, Any] | None,
     params: Mapping[str, Any] | None,
@@ -144,7 +145,7 @@ def observe(
         x0 = initial_state(loop, member.start)
         points = points_around(x0) if place == 0 else [(0.0, x0)]
         check_same(loop, compiled.system, points, member.params, params)
-        response: Any = input_output_response(
+        response = input_output_response(
             compiled,
             member.times,
             0,
@@ -167,7 +168,7 @@ def observe(
         )
 
 
-def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any]:
+def _along(loop: ct.InterconnectedSystem, response: SystemResponse, count: int) -> list[Any]:
     """Return times and states of the loop that a response of the observed loop has visited."""
     states = np.asarray(response.states)[: loop.nstates or 0]
     finite = np.flatnonzero(np.isfinite(states).all(axis=0))
@@ -176,7 +177,7 @@ def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any
 
 
 def _reference(
-    loop: ct.InterconnectedSystem, parts: Parts, response: Any, signals: Signals
+    loop: ct.InterconnectedSystem, parts: Parts, response: SystemResponse, signals: Signals
 ) -> Margin | None:
     """Compare the reference's derivatives with those of its own outputs."""
     states = np.asarray(response.states)[: loop.nstates or 0]

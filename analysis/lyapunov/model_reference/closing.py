@@ -15,6 +15,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import control as ct
 import numpy as np
 from flint import arb
 
@@ -163,7 +164,9 @@ MODEL_REFERENCE = ProofKind(
 _EQUAL = 1e-7  # relative to the size of the terms
 
 
-def check_decrease(loop: Any, match: Matching, params: Mapping[str, Any] | None = None) -> None:
+def check_decrease(
+    loop: ct.InterconnectedSystem, match: Matching, params: Mapping[str, Any] | None = None
+) -> None:
     """Compare V' of the proof with that of the loop, at points."""
     u, understood = np.zeros(loop.ninputs or 0), match.loop.understood
     rates_of, outputs_of = rates_and_outputs(loop, params), rates_and_outputs(understood)

@@ -122,7 +122,7 @@ class Matching:
         return _ball(self.beta), _ball(share), tuple(_ball(self.lam * w) for w in self.W)
 
 
-def _ball(x: Any) -> Ball:
+def _ball(x: object) -> Ball:
     return Ball(ball(x))
 
 

@@ -18,6 +18,7 @@ from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
 from nlctl.references import FilteredStep, FunctionReference, SumOfSines
 from nlctl.upstream.control_internals import current_parameters
+from nlctl.upstream.systems import System
 
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import enclose
@@ -78,7 +79,7 @@ class ModelReferenceLoop(CheckedLoop):
         return exact(self.spec("law").gain) if self.own_feedback else Fraction(1)
 
 
-def is_model_reference(loop: Any) -> bool:
+def is_model_reference(loop: System) -> bool:
     """Whether a diagram has a reference model, a block that outputs xm1 and nu."""
     return isinstance(loop, ct.InterconnectedSystem) and any(
         {"xm1", "nu"} <= set(declared(place, "outputs")) for place in leaves(loop)

@@ -29,7 +29,7 @@ def ball(x: Any) -> arb:
     return arb(rational(x)) if isinstance(x, Fraction | fmpq) else arb(x)
 
 
-def rational(x: Any) -> fmpq:
+def rational(x: object) -> fmpq:
     """Return a finite number as a rational one of flint."""
     if isinstance(x, fmpq):
         return x

@@ -15,7 +15,6 @@ value.
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 import numpy as np
 
@@ -119,7 +118,7 @@ def aftermath(
     )
 
 
-def _bounds(kG: Any) -> tuple[float, float]:
+def _bounds(kG: object) -> tuple[float, float]:
     """Return both ends of a range of gains."""
     ends = as_numbers(kG)
     if ends is None or ends.shape != (2,) or not 0 < ends[0] <= ends[1] < np.inf:

@@ -174,7 +174,7 @@ def long_run(
 def _watched(
     compiled: native.Compiled,
     times: np.ndarray,
-    start: Any,
+    start: object,
     progress: Callable[[float], object] | None,
     settings: Mapping[str, Any],
 ) -> Any:

@@ -22,6 +22,7 @@ import itertools
 from dataclasses import dataclass
 from typing import Any
 
+import control as ct
 import numpy as np
 from scipy.integrate import quad, trapezoid
 
@@ -32,6 +33,7 @@ from nlctl.attributes import described_record
 from nlctl.diagrams import known_system, state_names
 from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
 from nlctl.errors import DiagramError, ParameterError
+from nlctl.upstream.systems import SystemResponse
 
 from ...response_of_loop import check_response, check_shape, own_outputs, own_parameters
 from ..loop.roles import read_parts
@@ -41,7 +43,7 @@ from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 _SIGNALS = ("zeta", "r", "u")
 
 
-def law_of_response(loop: Any, response: Any) -> GainFunction:
+def law_of_response(loop: ct.InterconnectedSystem, response: SystemResponse) -> GainFunction:
     """Return the Nussbaum function of the loop that a response is of."""
     # The response is compared with the loop, see `nlctl.analysis.response_of_loop`, and at its
     # samples N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.

@@ -22,7 +22,7 @@ def with_study_live(
     report: Report,
     result: Result,
     prepared: Prepared,
-    kept: Histories | None,
+    histories: Histories | None,
     names: Sequence[str] = (),
 ) -> Report:
     """Return the report of a study with its nominal loop, which the page runs."""
@@ -31,22 +31,23 @@ def with_study_live(
     experiment = prepared.experiment
     space = experiment.space
     diagram: Any = loop_of(prepared).diagram
-    given = arguments_of_row(space, nominal(space))
+    arguments = arguments_of_row(space, nominal(space))
     response: Any = input_output_response(
-        diagram, experiment.timepts, experiment.inputs, given["initial_state"],
-        params=given["params"], rtol=experiment.rtol, atol=experiment.atol,
+        diagram, experiment.timepts, experiment.inputs, arguments["initial_state"],
+        params=arguments["params"], rtol=experiment.rtol, atol=experiment.atol,
     )  # fmt: skip
-    program = live_program(diagram, response, given["params"])
+    program = live_program(diagram, response, arguments["params"])
     boxes = [f"{q.name}={q.box[0]!r}:{q.box[1]!r}" for q in space.quantities if not q.is_integer]
-    watched = kept.signals if kept else {}  # by the spec; the page draws each in a row
+    watched = histories.signals if histories else {}  # by the spec; the page draws each in a row
     item = live_item(
         program, response, names or boxes, requirements=experiment.spec.requirements,
-        histories=kept, command=_repeated(result, experiment, given), base=given["params"],
+        histories=histories, command=_repeated(result, experiment, arguments),
+        base=arguments["params"],
         signals=[name for name in watched if name in response.output_labels],
     )  # fmt: skip
     key = report.sections[0].key
-    if kept is not None:
-        key, runs = "study_fans", len(next(iter(kept.signals.values()), ()))
+    if histories is not None:
+        key, runs = "study_fans", len(next(iter(histories.signals.values()), ()))
         shaded = f" Shaded: 90 % of {counted(runs, 'run')} of the study."
         item = replace(item, caption=item.caption + shaded)
     sections = [

@@ -204,7 +204,7 @@ def _brief(
             )
 
 
-def _sentence(finding: Finding, asked: Any) -> str:
+def _sentence(finding: Finding, asked: object) -> str:
     """Return what was found, and what was varied if that is not everything."""
     sentence = without_assumptions(finding.sentence)
     if not (isinstance(asked, Varied) and asked.quantities):

@@ -154,37 +154,39 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
     )
 
 
-def fan_items(kept: Histories, key: str) -> Iterator[Item]:
+def fan_items(histories: Histories, key: str) -> Iterator[Item]:
     """Yield quantile fans of some rows with the nominal and the worst run, and these as charts."""
-    count = len(next(iter(kept.signals.values())))
+    count = len(next(iter(histories.signals.values())))
     ended = (
-        f" Runs that did not reach their end, {kept.ended} of these, count from there on as lying "
-        "beyond both ends of every band."
-        if kept.ended
+        f" Runs that did not reach their end, {histories.ended} of these, count from there on as "
+        "lying beyond both ends of every band."
+        if histories.ended
         else ""
     )
-    worst = margin_text(kept.margin)
+    worst = margin_text(histories.margin)
     caption = (
-        f"The first {counted(count, 'row')} simulated again: {_bands(kept)}, the nominal run, and "
-        f"the worst run that is known (margin {worst}).{_limits(kept)}{ended} What leaves the "
-        "picture is cut off."
+        f"The first {counted(count, 'row')} simulated again: {_bands(histories)}, the nominal run, "
+        f"and the worst run that is known (margin {worst}).{_limits(histories)}{ended} What "
+        "leaves the picture is cut off."
     )
     drawn = figures.fans(
-        kept.time, kept.signals, kept.nominal, kept.worst,
-        limits=kept.limits, units=kept.units, groups=kept.groups,
+        histories.time, histories.signals, histories.nominal, histories.worst,
+        limits=histories.limits, units=histories.units, groups=histories.groups,
     )  # fmt: skip
-    yield captioned(f"{key}-fans", caption, _peaks(kept), drawn)
-    runs = {"nominal": kept.nominal, "worst": kept.worst}
-    both = {f"{name}, {run}": runs[run][name] for name in kept.nominal for run in runs}
+    yield captioned(f"{key}-fans", caption, _peaks(histories), drawn)
+    runs = {"nominal": histories.nominal, "worst": histories.worst}
+    both = {f"{name}, {run}": runs[run][name] for name in histories.nominal for run in runs}
     yield History(
         key=f"{key}-history",
         caption=f"The nominal run and the worst one that is known (margin {worst}).",
-        description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
-        "figure above shows the same runs, the slider below shows their values.",
-        time=kept.time,
+        description=f"Chart of {', '.join(histories.nominal)} in the nominal and in the worst run; "
+        "the figure above shows the same runs, the slider below shows their values.",
+        time=histories.time,
         signals=both,
         shown=list(both)[: len(runs)],
-        bands={} if kept.groups else {f"{n}, nominal": _most(y) for n, y in kept.signals.items()},
+        bands={}
+        if histories.groups
+        else {f"{n}, nominal": _most(y) for n, y in histories.signals.items()},
     )
 
 

@@ -122,7 +122,7 @@ def _metric(metric: Metric) -> dict[str, Any]:
     }
 
 
-def _function(function: Any) -> str:
+def _function(function: object) -> str:
     """Return a function's name, and a key of it and of all that it reaches."""
     plain = function
     while isinstance(plain, functools.partial):
@@ -144,12 +144,12 @@ def _table(points: pd.DataFrame) -> str:
 def differences_of(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """Return what differs between two identities, one text for each place."""
     old, new = dict(_flat(before)), dict(_flat(now))
-    places = [place for place in {**old, **new} if place != "sha256"]
+    keys = [key for key in {**old, **new} if key != "sha256"]
     missing = "nothing"
     return [
-        f"{place} was {old.get(place, missing)}, now {new.get(place, missing)}"
-        for place in places
-        if not _same(old.get(place, missing), new.get(place, missing))
+        f"{key} was {old.get(key, missing)}, now {new.get(key, missing)}"
+        for key in keys
+        if not _same(old.get(key, missing), new.get(key, missing))
     ]
 
 

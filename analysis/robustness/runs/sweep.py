@@ -47,7 +47,7 @@ class Sweep:
     folder: Path | None  # Where the rows are kept.
     done: int  # Number of rows that are finished.
     complete: bool  # Whether these are all rows of the design.
-    decided: Any = None  # What ended the sweep early, see `sweep`; None if nothing did.
+    decided: object = None  # What ended the sweep early, see `sweep`; None if nothing did.
     # Whether Ctrl-C was pressed; in the last chunk that leaves it complete.
     interrupted: bool = False
     # What the user has to know: damaged chunks that were run again, lost workers.
@@ -254,7 +254,7 @@ def sweep(
 
 
 def _check(
-    prepared: Prepared, design: Design, executor: Any, threads: int | None, nothing_kept: bool
+    prepared: Prepared, design: Design, executor: object, threads: int | None, nothing_kept: bool
 ) -> None:
     of_type("a sweep", "prepared", prepared, Prepared, "prepare(experiment)")
     of_type("a sweep", "design", design, Design, "independent(space, size)")
@@ -290,7 +290,7 @@ class _Run:
     interrupt: Interrupt
     progress: Callable[[Progress], object] | None
     stop: Callable[[Progress], Any] | None
-    decided: Any = None
+    decided: object = None
 
     def wants_more(self) -> bool:
         """Whether another chunk should begin."""
@@ -337,7 +337,7 @@ def gentle_interrupt() -> Iterator[Interrupt]:
     # nothing changes. What listened before listens again afterwards.
     interrupt = Interrupt()
 
-    def pressed(number: int, frame: Any) -> None:
+    def pressed(number: int, frame: object) -> None:
         if interrupt.asked:
             raise KeyboardInterrupt
         interrupt.asked = True

@@ -122,7 +122,7 @@ def _tries(
 
 def _refusal(
     space: Space,
-    record: Any,
+    record: object,
     path: str,
     keys: Mapping[str, str],
     corner: Mapping[str, Any],

@@ -304,7 +304,7 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
     return violates(series)
 
 
-def series_of(values: Any, name: str) -> pd.Series:
+def series_of(values: object, name: str) -> pd.Series:
     """Return numbers by row."""
     try:
         kind = pd.Series(values).dtype.kind

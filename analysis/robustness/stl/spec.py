@@ -308,7 +308,7 @@ def checked_breaks(breaks: ArrayLike | None) -> np.ndarray | None:
     return np.unique(times)
 
 
-def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np.ndarray:
+def _samples(requirement: Requirement, t: object, signals: Mapping[str, Any]) -> np.ndarray:
     """Return the times and the signals that count as rows of one array."""
     given = {"t": t} | {f"signal '{name}'": signals[name] for name in requirement.signals}
     rows = {name: as_numbers(values) for name, values in given.items()}

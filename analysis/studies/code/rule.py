@@ -176,7 +176,7 @@ def _reason(name: str, grant: Grant) -> str:
     return grant.admits(path) if path.is_file() else ""
 
 
-def check_defined(function: Any, name: str, grant: Grant) -> None:
+def check_defined(function: object, name: str, grant: Grant) -> None:
     """Refuse a function that another module defines than one that may run."""
     # A file may have the names of others: ``from pandas import read_pickle``.
     module = getattr(_plain(function), "__module__", None) or ""
@@ -302,7 +302,7 @@ def _installed(top: str) -> tuple[Path, ...]:
     return tuple(sites)
 
 
-def check_function(function: Any, name: str) -> None:
+def check_function(function: object, name: str) -> None:
     """Refuse what no study needs to be called: functions of the standard library, builtins."""
     if isinstance(function, ct.InputOutputSystem):
         raise ParameterError(
@@ -317,7 +317,7 @@ def check_function(function: Any, name: str) -> None:
         )
 
 
-def check_loop_function(function: Any, name: str) -> None:
+def check_loop_function(function: object, name: str) -> None:
     """Refuse, without calling it, a function that is not known to return a diagram."""
     # That is known by its return annotation, or because it, or what it calls, uses control or
     # nlctl.
@@ -363,24 +363,24 @@ def _outermost(annotation: str) -> str:
     return annotation.strip().partition("[")[0].rpartition(".")[2]
 
 
-def _uses_makers(thing: object, seen: set[int]) -> bool:
+def _uses_makers(member: object, seen: set[int]) -> bool:
     """Whether a function, or what it reaches, reads something of control or nlctl."""
-    thing = _plain(thing)
-    if isinstance(thing, ModuleType):
-        return _is_maker(thing.__name__)
-    if _is_maker(getattr(thing, "__module__", None) or ""):
+    member = _plain(member)
+    if isinstance(member, ModuleType):
+        return _is_maker(member.__name__)
+    if _is_maker(getattr(member, "__module__", None) or ""):
         return True
-    if id(thing) in seen:
+    if id(member) in seen:
         return False
-    seen.add(id(thing))
-    if isinstance(thing, type):
-        return any(_uses_makers(part, seen) for part in vars(thing).values() if callable(part))
-    if not isinstance(thing, FunctionType):
-        module = type(thing).__module__.partition(".")[0]
-        return module not in sys.stdlib_module_names and _uses_makers(type(thing), seen)
-    names = _names(thing.__code__)
-    reached = [thing.__globals__[name] for name in names if name in thing.__globals__]
-    reached += [cell.cell_contents for cell in thing.__closure__ or () if _is_filled(cell)]
+    seen.add(id(member))
+    if isinstance(member, type):
+        return any(_uses_makers(part, seen) for part in vars(member).values() if callable(part))
+    if not isinstance(member, FunctionType):
+        module = type(member).__module__.partition(".")[0]
+        return module not in sys.stdlib_module_names and _uses_makers(type(member), seen)
+    names = _names(member.__code__)
+    reached = [member.__globals__[name] for name in names if name in member.__globals__]
+    reached += [cell.cell_contents for cell in member.__closure__ or () if _is_filled(cell)]
     imported = {name.partition(".")[0] for name in names}  # inside of the function
     return bool(imported & set(MAKERS)) or any(_uses_makers(part, seen) for part in reached)
 

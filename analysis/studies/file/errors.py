@@ -135,7 +135,7 @@ def _parsed(statement: str) -> dict[str, Any]:
         return {}
 
 
-def _path(statement: Any) -> KeyPath:
+def _path(statement: object) -> KeyPath:
     """Return the dotted key of a statement; a value that is a table ends it as well."""
     path: list[str | int] = []
     while isinstance(statement, dict | list) and len(statement) == 1:
@@ -164,7 +164,7 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
         elif one["type"] == "tuple_type":
             message = "needs a list of values"
         elif one["type"] == "missing":
-            message = "is missing"
+            message = "is missing" + _meaning(model, one["loc"])
         elif one["type"] == "union_tag_not_found":
             place, message = (*place, "kind"), "is missing"
         elif one["type"] == "union_tag_invalid":
@@ -200,24 +200,36 @@ def _in_file(loc: KeyPath, data: Any, absent: bool) -> KeyPath:
     return tuple(place)
 
 
-def _keys_at(annotation: Any, loc: KeyPath) -> list[str]:
-    """Return the fields of the model that a place of pydantic's leads to."""
+def _keys_at(annotation: object, loc: KeyPath) -> list[str]:
+    """Return the fields of the models that a place of pydantic's leads to."""
+    return [name for model in _models_at(annotation, loc) for name in model.model_fields]
+
+
+def _models_at(annotation: object, loc: KeyPath) -> list[type[BaseModel]]:
+    """Return the models that a place of pydantic's leads to."""
     models = list(_models(annotation))
     for part in loc:
-        inner: list[Any] = []
+        inner: list[type[BaseModel]] = []
         for model in models:
             if part in model.model_fields:
                 inner += _models(model.model_fields[str(part)].annotation)
         tagged = [m for m in models if part in get_args(_tag(m))]
         models = inner or tagged or models  # a key of a dict, an index: the same models
-    return [name for model in models for name in model.model_fields]
+    return models
+
+
+def _meaning(model: type[BaseModel], loc: KeyPath) -> str:
+    """Return what a key is for, as its field describes it."""
+    fields = [one.model_fields.get(str(loc[-1])) for one in _models_at(model, loc[:-1])]
+    described = next((field.description for field in fields if field and field.description), "")
+    return f": {described[0].lower()}{described[1:].rstrip('.')}" if described else ""
 
 
 def _tag(model: type[BaseModel]) -> Any:
     return model.model_fields["kind"].annotation if "kind" in model.model_fields else None
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+def _models(annotation: object) -> Iterator[type[BaseModel]]:
     """Yield the models in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation

@@ -71,7 +71,7 @@ def _check_printable(value: object, place: str) -> None:
         )
 
 
-def check_depth(data: Any) -> None:
+def check_depth(data: object) -> None:
     """Refuse tables and lists that are nested deeper than those of any study."""
     rows: list[tuple[Any, str]] = [(data, "")]
     for _ in range(DEEPEST + 1):

@@ -300,7 +300,7 @@ def _medians(differences: pd.DataFrame, units: Mapping[Any, str], key: str) -> I
         )
 
 
-def _axis(metric: Any, units: Mapping[Any, str]) -> str:
+def _axis(metric: object, units: Mapping[Any, str]) -> str:
     unit = text.unit_text(units.get(metric, "1"))  # requirements are margins
     return f"median difference in {plain(metric)} ({unit})"
 

@@ -38,7 +38,7 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
         yield captioned(f"{key}-deviations", DEVIATIONS, f"{values}.", figures.deviations(table))
 
 
-def _marked(value: object, middle: Any) -> str:
+def _marked(value: object, middle: object) -> str:
     shown = value if isinstance(value, str) else f"{value:.6g}"
     return shown if value == middle else f"{shown} *"
 

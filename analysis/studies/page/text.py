@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
@@ -50,7 +49,7 @@ def clipped(margins: Iterable[float]) -> str:
     return CLIPPED if np.any(~(np.asarray(list(margins), dtype=float) >= -CLIP)) else ""
 
 
-def unit_text(unit: Any) -> str:
+def unit_text(unit: object) -> str:
     """Return a unit with its powers raised."""
     return "" if unit is None else in_print(str(unit))
 

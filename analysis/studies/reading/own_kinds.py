@@ -79,7 +79,7 @@ def stand_ins(data: Mapping[str, Any], known: Mapping[str, Kind]) -> dict[str, K
 
 
 def _stand_in(name: str) -> Kind:
-    def run(asked: Any, ground: Ground) -> Finding:
+    def run(asked: object, ground: Ground) -> Finding:
         raise ParameterError(f"the kind of analysis '{name}' has gone: put it back")
 
     title = name.rpartition(":")[2].replace("_", " ").capitalize()

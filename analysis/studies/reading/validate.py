@@ -55,7 +55,7 @@ class _Notes:
     def add(self, place: KeyPath, message: str) -> None:
         self.problems.append(Problem(place=place, message=message))
 
-    def attempt(self, place: KeyPath, make: Callable[..., _T], *arguments: Any) -> _T | None:
+    def attempt(self, place: KeyPath, make: Callable[..., _T], *arguments: object) -> _T | None:
         """Return what `make` returns; a mistake that it names is noted instead."""
         try:
             return make(*arguments)

@@ -18,7 +18,7 @@ errors = {}
 for actuator in (nlctl.DeadZone(), nlctl.Backlash()):
     loop = nlctl.paper.example_1(actuator=actuator)
     name = type(actuator).__name__
-    errors[name] = nlctl.input_output_response(loop, t).outputs[loop.output_index["e"]]
+    errors[name] = nlctl.input_output_response(loop, t).outputs["e"]
     axes.plot(t, errors[name], label=name)
 axes.set(xlabel="t (s)", ylabel="e")
 axes.legend()

@@ -28,7 +28,7 @@ figure, axes = plt.subplots(figsize=(7, 4))
 late = {}
 for name, controller in compared.items():
     loop = nlctl.paper.example_1(controller=controller)
-    e = nlctl.input_output_response(loop, t).outputs[loop.output_index["e"]]
+    e = nlctl.input_output_response(loop, t).outputs["e"]
     axes.plot(t, e, label=name, linewidth=1)
     late[name] = float(np.abs(e[t >= 10]).max())
 axes.set(xlabel="t (s)", ylabel="e")

@@ -15,9 +15,7 @@ from nlctl.analysis.paper import expectations
 loop = nlctl.paper.example_1()
 t = np.linspace(0, 20, 20_001)
 response = nlctl.input_output_response(loop, t)
-y, yd, e, u, zeta = (
-    response.outputs[loop.output_index[key]] for key in ("y", "yd", "e", "u", "zeta")
-)
+y, yd, e, u, zeta = (response.outputs[key] for key in ("y", "yd", "e", "u", "zeta"))
 
 figure, (above, middle, below) = plt.subplots(3, sharex=True, figsize=(6, 5))
 above.plot(t, yd, "--", label="reference")

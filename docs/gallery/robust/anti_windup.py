@@ -33,7 +33,7 @@ for T_t in (0.5, 1e6):
             "actuator": nlctl.Gain(),
         }
     )
-    y = nlctl.input_output_response(loop, t).outputs[loop.output_index["y"]]
+    y = nlctl.input_output_response(loop, t).outputs["y"]
     axes.plot(t, y, label=f"T_t = {T_t:g} s")
     overshoot[T_t] = float(np.max(y)) / 10 - 1
 axes.set(xlabel="t (s)", ylabel="y")

@@ -20,7 +20,7 @@ loop = nlctl.paper.example_1(
 )  # fmt: skip
 certificate = certify(loop)
 t = np.linspace(0, 40, 8001)
-r = nlctl.input_output_response(loop, t).outputs[loop.output_index["r"]]
+r = nlctl.input_output_response(loop, t).outputs["r"]
 
 figure, axes = plt.subplots(figsize=(6, 3))
 axes.semilogy(t, np.abs(r) + 1e-6, label="|r| of a run")

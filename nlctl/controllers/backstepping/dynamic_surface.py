@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
 
@@ -92,9 +90,9 @@ class DynamicSurface:
 def dynamic_surface_control(
     surface: DynamicSurface | None = None,
     *,
-    basis: Any = None,
-    weights: Any = None,
-    law: Any = None,
+    basis: object = None,
+    weights: object = None,
+    law: object = None,
     name: str = "controller",
 ) -> ct.InterconnectedSystem:
     """Connect dynamic surface control with a network: surface, basis -> weights -> law.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import control as ct
 
@@ -22,10 +21,10 @@ from .regressors import LinearRegressor
 def mrac(
     model: ReferenceModel | None = None,
     *,
-    error: Any = None,
-    basis: Any = None,
-    weights: Any = None,
-    law: Any = None,
+    error: object = None,
+    basis: object = None,
+    weights: object = None,
+    law: object = None,
     name: str = "controller",
 ) -> ct.InterconnectedSystem:
     """Connect model reference adaptive control: model -> error, basis -> weights -> law.

@@ -108,9 +108,9 @@ class FilteredLaw:
 def l1_adaptive(
     predictor: StatePredictor | None = None,
     *,
-    error: Any = None,
-    basis: Any = None,
-    weights: Any = None,
+    error: object = None,
+    basis: object = None,
+    weights: object = None,
     law: Any = None,
     name: str = "controller",
 ) -> ct.InterconnectedSystem:

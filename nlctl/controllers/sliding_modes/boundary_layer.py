@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
 
@@ -52,7 +50,7 @@ class SlidingModeLaw:
 
 @as_annotated
 def sliding_mode(
-    filtered_error: Any = None, law: Any = None, *, name: str = "controller"
+    filtered_error: object = None, law: object = None, *, name: str = "controller"
 ) -> ct.InterconnectedSystem:
     """Connect a sliding-mode controller: filtered error (14) -> law.
 

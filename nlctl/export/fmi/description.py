@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -33,7 +32,7 @@ def build_description(model: Model, code: list[str]) -> str:
     return _rendered("buildDescription.xml", model=model, code=code)
 
 
-def _rendered(template: str, **values: Any) -> str:
+def _rendered(template: str, **values: object) -> str:
     folder = files("nlctl.export.fmi") / "templates"
     templates = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,

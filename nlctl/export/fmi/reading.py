@@ -50,7 +50,7 @@ def read_model(
     fixed = _fixed(compiled)
     still = {*program.memory, *program.sampled}
     return Model(
-        name=c_name(what if name is None else name), meaning=what,
+        name=c_name(name, what), meaning=what,
         variables=tuple(all_variables(compiled, system, at, p, start, fixed)), places=at,
         continuous=tuple(i for i in range(rows["x"]) if i not in still), memory=program.memory,
         sampled=program.sampled, declared=program.switching, guards=program.guards,

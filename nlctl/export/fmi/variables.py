@@ -7,6 +7,7 @@ from collections.abc import Collection
 from itertools import accumulate
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from ...diagrams import state_names
@@ -40,7 +41,7 @@ def is_structured(variables: Collection[Variable]) -> bool:
 
 def all_variables(
     compiled: Compiled,
-    diagram: Any,
+    diagram: ct.InterconnectedSystem,
     at: dict[str, int],
     p: np.ndarray,
     start: np.ndarray,
@@ -89,7 +90,7 @@ def _states_and_rates(
     return [*states, *rates]
 
 
-def _signals(diagram: Any, at: dict[str, int], known: set[str]) -> list[Variable]:
+def _signals(diagram: object, at: dict[str, int], known: set[str]) -> list[Variable]:
     """Return inputs and outputs; one whose name is taken gets a path in front of it."""
     signals = []
     for kind in ("inputs", "outputs"):

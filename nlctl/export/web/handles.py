@@ -105,7 +105,12 @@ class _Reader:
     """What there is to be moved of a loop."""
 
     def __init__(
-        self, compiled: Compiled, p: np.ndarray, x0: np.ndarray, u: np.ndarray, span: Any
+        self,
+        compiled: Compiled,
+        p: np.ndarray,
+        x0: np.ndarray,
+        u: np.ndarray,
+        span: tuple[float, float],
     ) -> None:
         self.compiled, self.p, self.x0, self.u, self.span = compiled, p, x0, u, span
         self.system = compiled.system

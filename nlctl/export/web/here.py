@@ -6,7 +6,6 @@ import ctypes
 import functools
 import lzma
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -61,7 +60,7 @@ def _integrators() -> Callable[..., None]:
     loaded = finished(lzma.compress(module.as_bitcode(), preset=1), ("start", "advance", "outputs"))
     nothing = (_PLACE * 4)()
 
-    def call(name: str, *numbers: Any) -> None:
+    def call(name: str, *numbers: object) -> None:
         kinds = [_NUMBER] * len(numbers)
         function = ctypes.CFUNCTYPE(ctypes.c_int32, _PLACE, _PLACE, *kinds)
         function(loaded.addresses[name])(nothing, ctypes.byref(nothing, 8), *numbers)

@@ -70,11 +70,11 @@ class WebProgram:
 @as_annotated
 def web_program(
     diagram: ct.InterconnectedSystem,
-    times: Any,
-    inputs: Any = 0.0,
+    times: object,
+    inputs: object = 0.0,
     *,
     params: Mapping[str, Any] | None = None,
-    initial_state: Any = None,
+    initial_state: object = None,
     rtol: float | None = None,
     atol: float | None = None,
 ) -> WebProgram:

@@ -37,7 +37,7 @@ class _Cell:
 def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     function = getattr(operator, name)
 
-    def method(self: _Cell, *other: Any) -> Any:
+    def method(self: _Cell, *other: object) -> Any:
         if other and isinstance(other[0], np.ndarray):
             if other[0].ndim:
                 return NotImplemented
@@ -113,7 +113,7 @@ def _of_one_kind(graph: Graph, cells: np.ndarray) -> np.ndarray:
 def by_numpy(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of NumPy for arrays of expressions."""
 
-    def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
+    def written(graph: Graph, *arguments: object, **options: object) -> Any:
         named = {name: unrolled(v) for name, v in options.items()}
         return rolled(graph, function(*map(unrolled, arguments), **named))
 

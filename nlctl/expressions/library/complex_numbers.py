@@ -19,7 +19,7 @@ from .table import enter
 class ComplexPair(Computed):
     """An array of complex numbers: the real and the imaginary parts."""
 
-    def __init__(self, graph: Graph, real: Any, imag: Any) -> None:
+    def __init__(self, graph: Graph, real: object, imag: object) -> None:
         self.graph = graph
         self.real, self.imag = np_broadcast(graph, real, imag)
 
@@ -71,19 +71,19 @@ class ComplexPair(Computed):
         value = paired(self.graph, value)
         self.real[key], self.imag[key] = value.real, value.imag
 
-    def __pow__(self, exponent: Any) -> ComplexPair:
+    def __pow__(self, exponent: object) -> ComplexPair:
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
             raise Untraceable("a power of complex numbers that is not a small integer")
         unity = paired(self.graph, 1.0)
         return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), unity)
 
-    def _text(self, *_: Any) -> Any:
+    def _text(self, *_: object) -> Any:
         raise Untraceable("a complex number instead of a real one")
 
     __bool__ = __float__ = __str__ = __repr__ = __format__ = _text
 
 
-def np_broadcast(graph: Graph, real: Any, imag: Any) -> tuple[Tracer, Tracer]:
+def np_broadcast(graph: Graph, real: object, imag: object) -> tuple[Tracer, Tracer]:
     """Return two arrays in one shape."""
     a, b = traced(graph, real), traced(graph, imag)
     if a.shape != b.shape:
@@ -123,7 +123,7 @@ def _mul(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:
     return ComplexPair(graph, a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real)
 
 
-def paired_product(graph: Graph, a: Any, b: Any) -> ComplexPair:
+def paired_product(graph: Graph, a: object, b: object) -> ComplexPair:
     """Return the matrix product of complex numbers."""
     a, b = paired(graph, a), paired(graph, b)
     real = product(a.real, b.real) - product(a.imag, b.imag)
@@ -165,7 +165,7 @@ def _angle(graph: Graph, z: ComplexPair) -> Tracer:
     return elementwise(graph, "arctan2", z.imag, z.real)
 
 
-def _select(graph: Graph, condition: Any, a: ComplexPair, b: ComplexPair) -> ComplexPair:
+def _select(graph: Graph, condition: object, a: ComplexPair, b: ComplexPair) -> ComplexPair:
     parts = ((a.real, b.real), (a.imag, b.imag))
     return ComplexPair(graph, *(elementwise(graph, "select", condition, *p) for p in parts))
 
@@ -190,14 +190,14 @@ ComplexPair.__matmul__ = lambda self, other: paired_product(self.graph, self, ot
 ComplexPair.__rmatmul__ = lambda self, other: paired_product(self.graph, other, self)  # type: ignore[attr-defined]
 
 
-def complex_number(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
+def complex_number(graph: Graph, real: object = 0.0, imag: object = 0.0) -> Any:
     """Return ``complex(real, imag)``."""
     if isinstance(real, ComplexPair):
         return real
     return ComplexPair(graph, real, imag)
 
 
-def rect(graph: Graph, size: Any, angle: Any) -> ComplexPair:
+def rect(graph: Graph, size: object, angle: object) -> ComplexPair:
     """Return ``cmath.rect``."""
     cos, sin = (elementwise(graph, f, angle) for f in ("cos", "sin"))
     return ComplexPair(
@@ -208,7 +208,9 @@ def rect(graph: Graph, size: Any, angle: Any) -> ComplexPair:
 def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a discrete Fourier transform, by its matrices: of the real and imaginary parts."""
 
-    def written(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
+    def written(
+        graph: Graph, values: object, n: object = None, axis: int = -1, norm: object = None
+    ) -> Any:
         z = paired(graph, values)
         if z.ndim != 1 or not isinstance(n, int | None) or norm is not None or axis not in (0, -1):
             raise Untraceable("a Fourier transform with other arguments")

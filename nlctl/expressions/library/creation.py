@@ -30,7 +30,7 @@ def holds_traced(value: object) -> bool:
 
 
 @of(np.zeros, np.empty, makes=True)
-def _zeros(graph: Graph, shape: Any, dtype: object = float) -> Any:
+def _zeros(graph: Graph, shape: object, dtype: object = float) -> Any:
     """Return an array of zeros."""
     if dtype in (complex, np.complex128):
         return ComplexPair(graph, full(graph, shape, 0.0), full(graph, shape, 0.0))
@@ -41,7 +41,7 @@ def _zeros(graph: Graph, shape: Any, dtype: object = float) -> Any:
 
 
 @of(np.ones, makes=True)
-def ones(graph: Graph, shape: Any, dtype: object = float) -> Any:
+def ones(graph: Graph, shape: object, dtype: object = float) -> Any:
     """Return an array of ones."""
     if dtype in (int, bool):
         return np.ones(shape, dtype)
@@ -73,7 +73,7 @@ def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
 
 
 @of(np.array, makes=True)
-def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin: int = 0) -> Any:
+def array(graph: Graph, values: Any, dtype: Any = None, copy: bool = True, ndmin: int = 0) -> Any:
     """Return numbers, lists and arrays as an array of its own."""
     if not holds_traced(values):
         result = np.array(values, dtype, ndmin=ndmin)
@@ -107,7 +107,7 @@ def _of_floats(graph: Graph, array: Tracer) -> Tracer:
 
 
 @of(np.asarray, np.asanyarray, np.ascontiguousarray, np.asarray_chkfinite, makes=True)
-def asarray(graph: Graph, values: Any, dtype: object = None) -> Any:
+def asarray(graph: Graph, values: object, dtype: object = None) -> Any:
     """Return an array as it is, anything else as an array."""
     if isinstance(values, ComplexPair):
         return values
@@ -128,7 +128,9 @@ def eye(graph: Graph, n: int, m: Any = None, k: int = 0, dtype: Any = float) -> 
 
 
 @of(np.linspace)
-def linspace(graph: Graph, start: Any, stop: Any, num: int = 50, endpoint: bool = True) -> Tracer:
+def linspace(
+    graph: Graph, start: object, stop: object, num: int = 50, endpoint: bool = True
+) -> Tracer:
     """Return numbers at equal distances."""
     parts = num - 1 if endpoint else num
     start, stop = traced(graph, start), traced(graph, stop)

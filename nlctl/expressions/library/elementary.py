@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..masked import MaskedPlaces
@@ -18,21 +20,21 @@ __all__: list[str] = []
 
 
 @formula(np.sinc)
-def sinc(np: Facade, x: Any) -> Any:
+def sinc(np: Facade, x: object) -> Any:
     """sin(pi x) / (pi x)."""
     y = np.pi * np.where(x == 0.0, 1.0e-20, x)
     return np.sin(y) / y
 
 
 @formula(np.angle)
-def angle(np: Facade, x: Any, deg: bool = False) -> Any:
+def angle(np: Facade, x: Arithmetic, deg: bool = False) -> Any:
     """The angle of a complex number."""
     phase = np.arctan2(x.imag, x.real) if isinstance(x, ComplexPair) else np.arctan2(0.0 * x, x)
     return phase * (180.0 / np.pi) if deg else phase
 
 
 @formula(np.modf, math.modf)
-def parts_of_number(np: Facade, x: Any) -> Any:
+def parts_of_number(np: Facade, x: object) -> Any:
     """What is behind the point, and what is before it."""
     whole = np.trunc(x)
     rest = np.where(np.isinf(x), 0.0, x - whole)
@@ -40,7 +42,7 @@ def parts_of_number(np: Facade, x: Any) -> Any:
 
 
 @formula(np.round, np.around)
-def _rounded(np: Facade, x: Any, decimals: int = 0) -> Any:
+def _rounded(np: Facade, x: Arithmetic, decimals: int = 0) -> Any:
     """x with so many decimals, as NumPy rounds: by a power of ten there and back."""
     if decimals == 0:
         return np.rint(x)
@@ -51,7 +53,7 @@ def _rounded(np: Facade, x: Any, decimals: int = 0) -> Any:
 
 
 @formula(np.unwrap)
-def unwrap(np: Facade, x: Any) -> Any:
+def unwrap(np: Facade, x: Arithmetic) -> Any:
     """Angles without jumps by 2 pi."""
     d = np.diff(x)
     full = 2 * np.pi
@@ -65,7 +67,7 @@ def unwrap(np: Facade, x: Any) -> Any:
 
 
 @of(np.where)
-def where(graph: Graph, condition: Any, *values: Any) -> Any:
+def where(graph: Graph, condition: object, *values: object) -> Any:
     """Return one or the other."""
     if not values:
         return (flatnonzero(graph, condition),)
@@ -73,7 +75,7 @@ def where(graph: Graph, condition: Any, *values: Any) -> Any:
 
 
 @of(np.flatnonzero)
-def flatnonzero(graph: Graph, condition: Any) -> MaskedPlaces:
+def flatnonzero(graph: Graph, condition: object) -> MaskedPlaces:
     """Return where a condition holds."""
     mask = elementwise(graph, "ne", traced(graph, condition), 0.0)
     if mask.ndim != 1:
@@ -83,8 +85,8 @@ def flatnonzero(graph: Graph, condition: Any) -> MaskedPlaces:
 
 @of(np.clip)
 def _clip(
-    graph: Graph, values: Any, low: Any = None, high: Any = None, *, min: Any = None,  # noqa: A002
-    max: Any = None, out: Any = None,  # noqa: A002
+    graph: Graph, values: object, low: object = None, high: object = None, *, min: object = None,  # noqa: A002
+    max: object = None, out: Any = None,  # noqa: A002
 ) -> Any:  # fmt: skip
     """Return values between bounds."""
     low, high = low if low is not None else min, high if high is not None else max
@@ -99,7 +101,9 @@ def _clip(
 
 
 @of(np.select)
-def select(graph: Graph, conditions: Any, choices: Any, default: Any = 0) -> Any:
+def select(
+    graph: Graph, conditions: Sequence[Any], choices: Sequence[Any], default: object = 0
+) -> Any:
     """Return the first choice whose condition holds."""
     chosen = traced(graph, default)
     for condition, choice in reversed(list(zip(conditions, choices, strict=True))):
@@ -109,7 +113,12 @@ def select(graph: Graph, conditions: Any, choices: Any, default: Any = 0) -> Any
 
 @of(np.piecewise)
 def piecewise(
-    graph: Graph, x: Any, conditions: Any, functions: Any, *given: Any, **named: Any
+    graph: Graph,
+    x: object,
+    conditions: Sequence[Any],
+    functions: Any,
+    *given: object,
+    **named: object,
 ) -> Any:
     """Return what the function of the last condition that holds makes of x."""
     x = traced(graph, x)
@@ -127,7 +136,12 @@ def piecewise(
 
 @formula(np.nan_to_num)
 def nan_to_num(
-    np: Facade, x: Any, copy: bool = True, nan: Any = 0.0, posinf: Any = None, neginf: Any = None
+    np: Facade,
+    x: object,
+    copy: bool = True,
+    nan: object = 0.0,
+    posinf: object = None,
+    neginf: object = None,
 ) -> Any:
     """x with numbers for what is none."""
     largest = 1.7976931348623157e308
@@ -140,7 +154,9 @@ def nan_to_num(
 
 
 @formula(np.isclose)
-def _isclose(np: Facade, a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08) -> Any:
+def _isclose(
+    np: Facade, a: Arithmetic, b: Arithmetic, rtol: float = 1e-05, atol: float = 1e-08
+) -> Any:
     """Whether a is next to b."""
     near = np.logical_and(np.abs(a - b) <= atol + rtol * np.abs(b), np.isfinite(b + 0.0 * a))
     return np.logical_or(near, np.equal(a, b))

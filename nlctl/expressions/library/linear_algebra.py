@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import Tracer, as_array, scalar, traced
 from ..elimination import eliminated, is_zero, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
@@ -22,14 +23,14 @@ _Rows = list[list[Any]]
 _SMALL = 6  # rows of a matrix up to which elimination is written out, not one operation
 
 
-def _rows(graph: Graph, matrix: Any) -> _Rows:
+def _rows(graph: Graph, matrix: object) -> _Rows:
     array = traced(graph, matrix)
     if array.ndim != 2:
         raise Untraceable("many matrices at once")
     return [list(row) for row in array]
 
 
-def _square(graph: Graph, matrix: Any) -> _Rows:
+def _square(graph: Graph, matrix: object) -> _Rows:
     rows = _rows(graph, matrix)
     if any(len(row) != len(rows) for row in rows):
         raise Untraceable("a matrix that is not square")
@@ -46,7 +47,7 @@ def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
             raise Untraceable("a singular matrix")
 
 
-def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
+def solved(graph: Graph, matrix: object, b: object) -> Tracer:
     """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
     right, rows = traced(graph, b), _square(graph, matrix)
     if len(rows) > _SMALL:
@@ -105,13 +106,13 @@ def entries_written_out(graph: Graph, rows: _Rows, op: str) -> list[Any]:
 
 def of_triangle(
     graph: Graph,
-    a: Any,
-    b: Any,
-    trans: Any = 0,
-    lower: Any = False,
-    unit_diagonal: Any = False,
-    overwrite_b: object = False,
-    check_finite: object = True,
+    a: object,
+    b: object,
+    trans: object = 0,
+    lower: bool = False,
+    unit_diagonal: bool = False,
+    overwrite_b: bool = False,
+    check_finite: bool = True,
 ) -> Tracer:
     """Return the solution of equations with a triangular matrix, as SciPy's `solve_triangular`."""
     matrix, right = traced(graph, a), traced(graph, b)
@@ -131,7 +132,11 @@ def of_triangle(
 
 
 def of_cholesky(
-    graph: Graph, c_and_lower: Any, b: Any, overwrite_b: object = False, check_finite: object = True
+    graph: Graph,
+    c_and_lower: Any,
+    b: object,
+    overwrite_b: bool = False,
+    check_finite: bool = True,
 ) -> Tracer:
     """Return the solution of equations from the factor of SciPy's `scipy.linalg.cho_factor`."""
     c, lower = c_and_lower
@@ -140,8 +145,8 @@ def of_cholesky(
 
 
 def cholesky_factor(
-    graph: Graph, a: Any, lower: bool = False, overwrite_a: object = False,
-    check_finite: object = True,
+    graph: Graph, a: object, lower: bool = False, overwrite_a: bool = False,
+    check_finite: bool = True,
 ) -> tuple[Tracer, bool]:  # fmt: skip
     """Return SciPy's `scipy.linalg.cho_factor`: in the other triangle the matrix stays."""
     a = traced(graph, a)
@@ -153,10 +158,10 @@ def cholesky_factor(
 def of_triangles(
     graph: Graph,
     lu_and_piv: Any,
-    b: Any,
-    trans: Any = 0,
-    overwrite_b: object = False,
-    check_finite: object = True,
+    b: object,
+    trans: object = 0,
+    overwrite_b: bool = False,
+    check_finite: bool = True,
 ) -> Tracer:
     """Return the solution of equations from the factors of SciPy's `scipy.linalg.lu_factor`."""
     lu, pivots = lu_and_piv
@@ -171,11 +176,11 @@ def of_triangles(
     return of_triangle(graph, lu, first)
 
 
-def _of_each(written: Any) -> Any:
+def _of_each(written: Callable[..., Any]) -> Any:
     """Return a function of one matrix as one of many, one after the other."""
 
     @functools.wraps(written)
-    def function(graph: Graph, a: Any, *rest: Any) -> Any:
+    def function(graph: Graph, a: Arithmetic, *rest: object) -> Any:
         a, others = traced(graph, a), [traced(graph, b) for b in rest]
         if a.ndim < 3:
             return written(graph, a, *others)
@@ -189,14 +194,14 @@ def _of_each(written: Any) -> Any:
 
 @of(np.linalg.solve)
 @_of_each
-def _solve(graph: Graph, a: Any, b: Any) -> Tracer:
+def _solve(graph: Graph, a: object, b: object) -> Tracer:
     """Return the solution of linear equations."""
     return solved(graph, a, b)
 
 
 @of(np.linalg.inv)
 @_of_each
-def inv(graph: Graph, a: Any) -> Tracer:
+def inv(graph: Graph, a: object) -> Tracer:
     """Return the inverse of a matrix."""
     n = len(traced(graph, a))
     return solved(graph, a, np.eye(n))
@@ -204,7 +209,7 @@ def inv(graph: Graph, a: Any) -> Tracer:
 
 @of(np.linalg.det)
 @_of_each
-def det(graph: Graph, a: Any) -> Any:
+def det(graph: Graph, a: object) -> Any:
     """Return the determinant of a matrix: the product of the pivots, each exchange a minus."""
     rows = _square(graph, a)
     if len(rows) > _SMALL:
@@ -213,7 +218,7 @@ def det(graph: Graph, a: Any) -> Any:
 
 
 @of(np.linalg.slogdet)
-def slogdet(graph: Graph, a: Any) -> Any:
+def slogdet(graph: Graph, a: object) -> Any:
     """Return the sign of a determinant and the logarithm of its size."""
     value = det(graph, a)
     size = elementwise(graph, "log", elementwise(graph, "absolute", value))
@@ -249,7 +254,7 @@ class _NotComputed:
 
 
 @of(np.linalg.lstsq)
-def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
+def lstsq(graph: Graph, a: object, b: object, rcond: Any = None) -> tuple[Any, ...]:
     """Return the least squares solution; of a matrix that is constant the rest, too."""
     matrix = constant_value(traced(graph, a))
     if not isinstance(matrix, np.ndarray):
@@ -269,7 +274,7 @@ def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
 
 
 @of(np.linalg.cholesky)
-def cholesky(graph: Graph, a: Any) -> Tracer:
+def cholesky(graph: Graph, a: object) -> Tracer:
     """Return the lower factor of a positive definite matrix."""
     rows, np_ = _square(graph, a), Facade(graph)
     n = len(rows)
@@ -303,7 +308,7 @@ def cond(graph: Graph, x: Any, p: Any = None) -> Any:
 
 
 @of(np.linalg.eigvalsh)
-def eigvalsh(graph: Graph, a: Any) -> Tracer:
+def eigvalsh(graph: Graph, a: object) -> Tracer:
     """Return the eigenvalues of a symmetric matrix of two rows; NumPy reads the lower half."""
     rows, np_ = _square(graph, a), Facade(graph)
     if len(rows) == 1:

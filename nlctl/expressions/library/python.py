@@ -27,7 +27,7 @@ NUMBER_SAMPLES = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, 
 # these ask their arguments, as they do of arrays
 
 
-def of_math(graph: Graph, operation: str, result: Any, arguments: Any) -> Any:
+def of_math(graph: Graph, operation: str, result: object, arguments: tuple[Any, ...]) -> Any:
     """Return the result of a function of math, which raises errors where NumPy's does not."""
     if not isinstance(result, Tracer):
         return result
@@ -219,7 +219,7 @@ class Builtins:
 
 
 @of(copy.copy, copy.deepcopy)
-def copied(graph: Graph, value: Any, memo: Any = None) -> Any:
+def copied(graph: Graph, value: Any, memo: object = None) -> Any:
     """Return a copy."""
     if isinstance(value, Tracer):
         return value.copy()
@@ -231,12 +231,12 @@ def copied(graph: Graph, value: Any, memo: Any = None) -> Any:
 
 
 @of(np.vectorize)
-def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
+def vectorize(graph: Graph, function: Callable[..., Any], otypes: object = None) -> Any:
     """Return a function that is called for each element."""
 
     are_floats = otypes in ("d", [float], [np.float64], ["d"], ["float"], ["f8"])
 
-    def each(*arguments: Any) -> Any:
+    def each(*arguments: object) -> Any:
         arrays = [traced(graph, a).short() for a in arguments]
         shape = np.broadcast_shapes(*(a.shape for a in arrays))
         zero = traced(graph, np.zeros(shape))
@@ -256,10 +256,10 @@ def _is_float(graph: Graph, number: Tracer) -> bool:
 
 
 @of(np.frompyfunc, makes=True)
-def frompyfunc(graph: Graph, function: Any, nin: int, nout: int) -> Any:
+def frompyfunc(graph: Graph, function: Callable[..., Any], nin: int, nout: int) -> Any:
     """Return a function of numbers; of arrays NumPy's returns arrays of objects."""
 
-    def of_numbers(*arguments: Any) -> Any:
+    def of_numbers(*arguments: tuple[Any, ...]) -> Any:
         if nout != 1 or any(traced(graph, a).shape for a in arguments):
             raise Untraceable("np.frompyfunc of arrays")
         return function(*(_handed_over(graph, a) for a in arguments))
@@ -267,26 +267,26 @@ def frompyfunc(graph: Graph, function: Any, nin: int, nout: int) -> Any:
     return of_numbers
 
 
-def _handed_over(graph: Graph, value: Any) -> Any:
+def _handed_over(graph: Graph, value: object) -> Any:
     """Return what NumPy hands a function for an element: a number of Python's."""
     return python_number(graph, traced(graph, value).only)
 
 
 @of(functools.wraps, makes=True)
-def wraps(graph: Graph, *_: Any, **__: Any) -> Any:
+def wraps(graph: Graph, *_: object, **__: object) -> Any:
     """Return what leaves a function as it is: no equation asks for its name."""
     return lambda function: function
 
 
 @of(functools.cache, functools.lru_cache, makes=True)
-def uncached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) -> Any:
+def uncached(graph: Graph, function: object = None, typed: bool = False, **_: object) -> Any:
     """Return a function that computes again what Python's keeps."""
     if function is None or isinstance(function, int):
         return functools.partial(uncached, graph)
 
     around, first = getattr(function, "__closure__", None) or (), []
 
-    def computed(*arguments: Any, **named: Any) -> Any:
+    def computed(*arguments: object, **named: object) -> Any:
         for value in (*arguments, *named.values()):
             if isinstance(value, list | dict | set) or getattr(value, "shape", ()):
                 raise TypeError("a cache of what has no hash")
@@ -300,14 +300,16 @@ def uncached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) 
     return computed
 
 
-def _never_changes(value: Any) -> bool:
+def _never_changes(value: object) -> bool:
     is_number = isinstance(value, bool | int | float | str | NoneType)
     is_alone = isinstance(value, FunctionType) and not value.__closure__
     return is_number or is_alone or (isinstance(value, Tracer) and not value.shape)
 
 
 @of(np.apply_along_axis)
-def apply_along_axis(graph: Graph, function: Any, axis: int, values: Any) -> Tracer:
+def apply_along_axis(
+    graph: Graph, function: Callable[..., Any], axis: int, values: object
+) -> Tracer:
     """Return what a function makes of each row or column."""
     array = traced(graph, values)
     if array.ndim != 2:

@@ -24,7 +24,11 @@ _MIDDLE = 64  # elements beyond which no extremes are written out
 
 
 def folded(
-    graph: Graph, values: Any, axis: Axis, keepdims: bool, function: Callable[[Sequence[Expr]], Any]
+    graph: Graph,
+    values: object,
+    axis: Axis,
+    keepdims: bool,
+    function: Callable[[Sequence[Expr]], Any],
 ) -> Tracer:
     """Return what a function makes of the elements along an axis, or of all."""
     array = traced(graph, values)
@@ -52,7 +56,12 @@ def _numbers(graph: Graph, row: Sequence[Expr]) -> list[Expr]:
 
 def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
     def written(
-        graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False, initial: Any = None
+        graph: Graph,
+        values: object,
+        axis: Axis = None,
+        *,
+        keepdims: bool = False,
+        initial: object = None,
     ) -> Any:
         def of_row(row: Sequence[Expr]) -> Expr:
             row = _numbers(graph, row)
@@ -87,8 +96,8 @@ of(np.nanmin)(_extreme("minimum", ignores_nan=True))
 
 @of(np.sum)
 def sum_along(
-    graph: Graph, values: Any, axis: Axis = None, dtype: object = None, *, keepdims: bool = False,
-    where: Any = True, initial: Any = None,
+    graph: Graph, values: object, axis: Axis = None, dtype: object = None, *,
+    keepdims: bool = False, where: object = True, initial: object = None,
 ) -> Any:  # fmt: skip
     """Return a sum."""
     if isinstance(values, Masked | ComplexPair):
@@ -110,7 +119,7 @@ def sum_along(
 
 
 @formula(np.nansum)
-def nansum(np: Facade, values: Any, axis: Axis = None) -> Tracer:
+def nansum(np: Facade, values: object, axis: Axis = None) -> Tracer:
     """Return a sum without what is NaN."""
     array = traced(np.graph, values)
     return np.sum(np.where(array == array, array, 0.0), axis)
@@ -122,7 +131,7 @@ def _count(array: Tracer, axis: Axis) -> float:
 
 
 @of(np.mean)
-def mean(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+def mean(graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False) -> Any:
     """Return a mean."""
     if isinstance(values, Masked):
         return values.mean()
@@ -135,7 +144,7 @@ def mean(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
 
 @formula(np.var)
 def var(
-    np: Facade, values: Any, axis: Axis = None, *, ddof: float = 0, keepdims: bool = False
+    np: Facade, values: object, axis: Axis = None, *, ddof: float = 0, keepdims: bool = False
 ) -> Tracer:
     """Return a variance."""
     array = with_counts(traced(np.graph, values))
@@ -144,7 +153,7 @@ def var(
 
 
 @formula(np.average)
-def average(np: Facade, values: Any, axis: Axis = None, weights: Any = None) -> Tracer:
+def average(np: Facade, values: object, axis: Axis = None, weights: object = None) -> Tracer:
     """Return a weighted mean."""
     if weights is None:
         return np.mean(values, axis)
@@ -159,7 +168,7 @@ def average(np: Facade, values: Any, axis: Axis = None, weights: Any = None) -> 
 
 
 @of(np.prod)
-def prod(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+def prod(graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False) -> Any:
     """Return a product."""
     if isinstance(values, Masked):
         return prod(graph, values.filled(1.0))
@@ -173,7 +182,7 @@ def prod(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
 
 
 def _of_truths(name: str, start: bool) -> Callable[..., Any]:
-    def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+    def written(graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False) -> Any:
         if isinstance(values, Masked):
             values = values.filled(start)
 
@@ -191,7 +200,7 @@ all_of = of(np.all)(_of_truths("and", True))
 
 
 @of(np.count_nonzero)
-def count_nonzero(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+def count_nonzero(graph: Graph, values: object, axis: Axis = None) -> Tracer:
     """Return how many elements are not 0."""
     array = traced(graph, values)
     are_truths = all(e.kind == "b" for e in array.values.flat)
@@ -204,7 +213,9 @@ def count_nonzero(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
 def _first(name: str) -> Callable[..., Any]:
     """Return what finds the first of the largest or smallest; NaN is beyond all."""
 
-    def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Tracer:
+    def written(
+        graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False
+    ) -> Tracer:
         def of_row(row: Sequence[Expr]) -> Expr:
             best, place = _numbers(graph, row)[0], graph.const(0)
             for k, e in enumerate(_numbers(graph, row)[1:], start=1):
@@ -246,7 +257,7 @@ def in_order(graph: Graph, row: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]
     return values, places
 
 
-def _along(graph: Graph, values: Any, axis: Any, function: Callable[..., list[Expr]]) -> Tracer:
+def _along(graph: Graph, values: object, axis: Any, function: Callable[..., list[Expr]]) -> Tracer:
     array = traced(graph, values)
     cells = array.elements().reshape(-1) if axis is None else array.elements()
     moved = np.moveaxis(cells, -1 if axis is None else axis, -1)
@@ -257,13 +268,13 @@ def _along(graph: Graph, values: Any, axis: Any, function: Callable[..., list[Ex
 
 
 @of(np.sort)
-def sort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
+def sort(graph: Graph, values: object, axis: object = -1) -> Tracer:
     """Return an array in order."""
     return _along(graph, values, axis, lambda row: in_order(graph, row)[0])
 
 
 @of(np.argsort)
-def argsort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
+def argsort(graph: Graph, values: object, axis: object = -1) -> Tracer:
     """Return where the elements of an ordered array were."""
     # Equal ones stay in their order; NumPy's own depends on the machine there.
     if traced(graph, values).shape[-1] > 16:
@@ -272,7 +283,7 @@ def argsort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
 
 
 @of(np.median)
-def median(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+def median(graph: Graph, values: object, axis: Axis = None) -> Tracer:
     """Return the one in the middle, NaN where one is NaN."""
 
     def of_row(row: Sequence[Expr]) -> Expr:
@@ -304,7 +315,7 @@ def _quantile(graph: Graph, row: Sequence[Expr], q: float) -> Expr:
 
 
 @of(np.quantile)
-def _quantiles(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+def _quantiles(graph: Graph, values: object, q: object, axis: Axis = None) -> Tracer:
     """Return the value below which a part q lies."""
     parts = np.asarray(constant_value(traced(graph, q)))
     if parts.dtype != float and parts.dtype.kind != "i":
@@ -315,7 +326,7 @@ def _quantiles(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
 
 
 @formula(np.cov)
-def cov(np: Facade, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
+def cov(np: Facade, m: object, y: object = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
     """Return the covariances of rows."""
     rows = [traced(np.graph, v) for v in (m, y) if v is not None]
     flat = [row for r in rows for row in (r if r.ndim == 2 else [r])]
@@ -326,7 +337,7 @@ def cov(np: Facade, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = No
 
 
 @formula(np.corrcoef)
-def corrcoef(np: Facade, x: Any, y: Any = None) -> Tracer:
+def corrcoef(np: Facade, x: object, y: object = None) -> Tracer:
     """Return the correlations of rows."""
     c = np.cov(x, y)
     sizes = [np.sqrt(c[i, i]) for i in range(len(c))]
@@ -340,7 +351,10 @@ def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:
 
 
 @formula(np.linalg.norm)
-def norm(np: Facade, x: Any, ord: Any = None, axis: object = None, keepdims: bool = False) -> Any:  # noqa: A002
+def norm(
+    np: Facade, x: object, ord: Any = None, axis: object = None,  # noqa: A002
+    keepdims: bool = False,
+) -> Any:  # fmt: skip
     """Return a norm of a vector or matrix."""
     x = traced(np.graph, x)
     size = np.abs(x)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import Special, Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product
@@ -57,7 +58,7 @@ class Turn(Special):
             ],
         )
 
-    def apply(self, vectors: Any, inverse: bool = False) -> Tracer:
+    def apply(self, vectors: object, inverse: bool = False) -> Tracer:
         """Return rotated vectors."""
         matrix = self.as_matrix().T if inverse else self.as_matrix()
         vectors = traced(self.graph, vectors)
@@ -134,12 +135,12 @@ def _euler_angles(graph: Graph, quat: Sequence[Any], seq: str) -> list[Any]:
     return [_wrapped(op, v) for v in angles]
 
 
-def _wrapped(op: Callable[..., Any], angle: Any) -> Any:
+def _wrapped(op: Callable[..., Any], angle: Arithmetic) -> Any:
     angle = op("select", op("lt", angle, -math.pi), angle + 2 * math.pi, angle)
     return op("select", op("gt", angle, math.pi), angle - 2 * math.pi, angle)
 
 
-def from_quat(graph: Graph, quat: Any, *, scalar_first: bool = False) -> Turn:
+def from_quat(graph: Graph, quat: object, *, scalar_first: bool = False) -> Turn:
     """Return the rotation of a quaternion, which is normalised."""
     parts = _numbers(graph, quat, 4)
     if scalar_first:
@@ -151,14 +152,14 @@ def from_quat(graph: Graph, quat: Any, *, scalar_first: bool = False) -> Turn:
     return Turn(graph, [q / size for q in parts])
 
 
-def _numbers(graph: Graph, values: Any, count: int) -> list[Any]:
+def _numbers(graph: Graph, values: object, count: int) -> list[Any]:
     array = traced(graph, values)
     if array.shape != (count,):
         raise Untraceable("several rotations at once")
     return list(array)
 
 
-def from_rotvec(graph: Graph, rotvec: Any, degrees: bool = False) -> Turn:
+def from_rotvec(graph: Graph, rotvec: object, degrees: bool = False) -> Turn:
     """Return the rotation about an axis by its length."""
     op = functools.partial(elementwise, graph)
     parts = _numbers(graph, rotvec, 3)
@@ -171,7 +172,7 @@ def from_rotvec(graph: Graph, rotvec: Any, degrees: bool = False) -> Turn:
     return Turn(graph, [*(scale * v for v in parts), op("cos", angle / 2.0)])
 
 
-def from_euler(graph: Graph, seq: str, angles: Any, degrees: bool = False) -> Turn:
+def from_euler(graph: Graph, seq: str, angles: object, degrees: bool = False) -> Turn:
     """Return the rotation of Euler's angles."""
     array = traced(graph, angles)
     values = [array] if not array.shape else list(array)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ _COMPUTING = (
 def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of NumPy that moves elements; a view where NumPy's is one."""
 
-    def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
+    def written(graph: Graph, *arguments: object, **options: object) -> Any:
         owners: list[Tracer] = []
         given = [_opened(v, owners) for v in arguments]
         named = {k: _opened(v, owners) for k, v in options.items()}
@@ -88,10 +88,10 @@ for _function in _COMPUTING:
 
 
 @of(np.block)
-def _block(graph: Graph, parts: Any) -> Tracer:
+def _block(graph: Graph, parts: object) -> Tracer:
     """Return arrays and numbers, next to each other and in rows."""
 
-    def as_arrays(part: Any) -> Any:
+    def as_arrays(part: object) -> Any:
         if isinstance(part, list):
             return list(map(as_arrays, part))
         array = traced(graph, part)
@@ -101,7 +101,7 @@ def _block(graph: Graph, parts: Any) -> Tracer:
 
 
 @of(np.concatenate)
-def concatenate(graph: Graph, parts: Any, axis: object = 0) -> Tracer:
+def concatenate(graph: Graph, parts: Sequence[Any], axis: object = 0) -> Tracer:
     """Return arrays one after the other."""
     arrays = [traced(graph, p) for p in parts]
     if axis is None:
@@ -112,7 +112,7 @@ def concatenate(graph: Graph, parts: Any, axis: object = 0) -> Tracer:
 
 
 @of(np.split, np.array_split)
-def _split(graph: Graph, values: Any, sections: Any, axis: int = 0) -> Any:
+def _split(graph: Graph, values: object, sections: int, axis: int = 0) -> Any:
     """Return parts of an array, which are views."""
     array = traced(graph, values)
     if array.axis is None or array.ndim > 1:
@@ -122,7 +122,7 @@ def _split(graph: Graph, values: Any, sections: Any, axis: int = 0) -> Any:
 
 
 @of(np.hstack)
-def hstack(graph: Graph, parts: Any) -> Tracer:
+def hstack(graph: Graph, parts: Sequence[Any]) -> Tracer:
     """Return arrays next to each other."""
     arrays = [traced(graph, p) for p in parts]
     return concatenate(
@@ -131,7 +131,7 @@ def hstack(graph: Graph, parts: Any) -> Tracer:
 
 
 @of(np.append)
-def append(graph: Graph, array: Any, values: Any, axis: object = None) -> Tracer:
+def append(graph: Graph, array: object, values: object, axis: object = None) -> Tracer:
     """Return an array with values behind it."""
     arrays = [traced(graph, v) for v in (array, values)]
     if axis is not None:
@@ -140,7 +140,7 @@ def append(graph: Graph, array: Any, values: Any, axis: object = None) -> Tracer
 
 
 @of(np.diff)
-def diff(graph: Graph, a: Any, n: int = 1, axis: int = -1, **ends: Any) -> Tracer:
+def diff(graph: Graph, a: object, n: int = 1, axis: int = -1, **ends: object) -> Tracer:
     """Return differences of neighbours."""
     array = traced(graph, a)
     if array.axis is None or array.ndim > 1:
@@ -154,7 +154,7 @@ def diff(graph: Graph, a: Any, n: int = 1, axis: int = -1, **ends: Any) -> Trace
 
 
 @of(np.gradient)
-def gradient(graph: Graph, f: Any, *spacing: Any) -> Tracer:
+def gradient(graph: Graph, f: object, *spacing: object) -> Tracer:
     """Return central differences, one-sided ones at the ends."""
     array = traced(graph, f)
     h = traced(graph, spacing[0] if spacing else 1.0)
@@ -167,7 +167,7 @@ def gradient(graph: Graph, f: Any, *spacing: Any) -> Tracer:
 
 
 @of(np.roll)
-def roll(graph: Graph, a: Any, shift: Any, axis: object = None) -> Tracer:
+def roll(graph: Graph, a: object, shift: int, axis: object = None) -> Tracer:
     """Return an array whose elements have moved on."""
     array = traced(graph, a)
     if array.axis is None or array.ndim > 1 or isinstance(shift, tuple):
@@ -177,7 +177,7 @@ def roll(graph: Graph, a: Any, shift: Any, axis: object = None) -> Tracer:
 
 
 @of(np.pad)
-def pad(graph: Graph, a: Any, width: Any, mode: str = "constant", **options: Any) -> Tracer:
+def pad(graph: Graph, a: object, width: Any, mode: str = "constant", **options: object) -> Tracer:
     """Return an array with more at its ends."""
     array = traced(graph, a)
     if array.axis is None or array.ndim > 1:
@@ -194,7 +194,7 @@ def pad(graph: Graph, a: Any, width: Any, mode: str = "constant", **options: Any
 
 
 @of(np.dot, np.matmul, np.linalg.matmul)
-def dot(graph: Graph, a: Any, b: Any) -> Any:
+def dot(graph: Graph, a: object, b: object) -> Any:
     """Return a product of matrices."""
     if holds_complex(a) or holds_complex(b):
         return paired_product(graph, a, b)
@@ -205,7 +205,7 @@ def dot(graph: Graph, a: Any, b: Any) -> Any:
 
 
 @of(np.atleast_1d)
-def atleast_1d(graph: Graph, *values: Any) -> Any:
+def atleast_1d(graph: Graph, *values: object) -> Any:
     """Return numbers as arrays."""
     arrays = [traced(graph, v) for v in values]
     arrays_of_one = [a if a.shape else a.reshape(1) for a in arrays]
@@ -213,13 +213,13 @@ def atleast_1d(graph: Graph, *values: Any) -> Any:
 
 
 @of(np.copyto)
-def copyto(graph: Graph, target: Any, source: Any, where: Any = True) -> None:
+def copyto(graph: Graph, target: Tracer, source: object, where: object = True) -> None:
     """Assign to an array where a condition holds."""
     target[...] = source if where is True else elementwise(graph, "select", where, source, target)
 
 
 @of(np.put)
-def _put(graph: Graph, target: Any, places: Any, values: Any) -> None:
+def _put(graph: Graph, target: Tracer, places: object, values: object) -> None:
     """Assign to places of an array in one dimension."""
     if target.ndim != 1:
         raise Untraceable("put into a matrix")
@@ -227,14 +227,14 @@ def _put(graph: Graph, target: Any, places: Any, values: Any) -> None:
 
 
 @of(np.extract)
-def extract(graph: Graph, condition: Any, values: Any) -> Masked:
+def extract(graph: Graph, condition: object, values: object) -> Masked:
     """Return the elements where a condition holds."""
     mask, array = traced(graph, condition), traced(graph, values)
     return Masked(array, elementwise(graph, "ne", mask, 0.0))
 
 
 @of(np.place, np.putmask)
-def _place(graph: Graph, target: Any, mask: Any, values: Any) -> None:
+def _place(graph: Graph, target: Tracer, mask: object, values: object) -> None:
     """Assign where a condition holds: one value, or the elements of the same condition."""
     mask = elementwise(graph, "ne", traced(graph, mask), 0.0)
     if isinstance(values, Masked):
@@ -245,7 +245,7 @@ def _place(graph: Graph, target: Any, mask: Any, values: Any) -> None:
 
 
 @of(np.fill_diagonal)
-def fill_diagonal(graph: Graph, target: Any, value: Any) -> None:
+def fill_diagonal(graph: Graph, target: Tracer, value: Any) -> None:
     """Assign to the diagonal of a matrix."""
     if target.ndim != 2:
         raise Untraceable("the diagonal of something else than a matrix")
@@ -254,13 +254,13 @@ def fill_diagonal(graph: Graph, target: Any, value: Any) -> None:
 
 
 @of(np.size)
-def size(graph: Graph, values: Any, axis: Any = None) -> int:
+def size(graph: Graph, values: object, axis: Any = None) -> int:
     """Return the number of elements."""
     array = traced(graph, values)
     return array.size if axis is None else array.shape[axis]
 
 
-def permuted(graph: Graph, values: Any, *axes: Any) -> Tracer:
+def permuted(graph: Graph, values: object, *axes: object) -> Tracer:
     """Return an array with its axes in another order."""
     order = axes[0] if len(axes) == 1 and isinstance(axes[0], tuple | list | None) else axes
     return by_moving(np.transpose)(graph, values, order or None)
@@ -278,7 +278,7 @@ def _listed(graph: Graph, values: Tracer) -> Any:
     return python_number(graph, values.only)
 
 
-def item(graph: Graph, values: Tracer, *_place: Any) -> Any:
+def item(graph: Graph, values: Tracer, *_place: object) -> Any:
     """Return one element as a number."""
     if not _place and values.size != 1:
         raise Untraceable("the only element of an array that has more")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
@@ -55,7 +56,12 @@ formula(math.gamma)(gamma)
 
 
 def cumulative_trapezoid(
-    np: Facade, y: Any, x: Any = None, dx: Any = 1.0, axis: int = -1, initial: Any = None
+    np: Facade,
+    y: object,
+    x: object = None,
+    dx: object = 1.0,
+    axis: int = -1,
+    initial: object = None,
 ) -> Tracer:
     """Return the integrals from the first place to each."""
     y = traced(np.graph, y)
@@ -66,12 +72,12 @@ def cumulative_trapezoid(
     return sums if initial is None else np.concatenate([[initial], sums])
 
 
-def _distance(np: Facade, u: Any, v: Any) -> Any:
+def _distance(np: Facade, u: object, v: object) -> Any:
     apart = np.subtract(u, v)
     return np.sqrt(np.sum(apart * apart))
 
 
-def _distances(np: Facade, one: Any, other: Any) -> Any:
+def _distances(np: Facade, one: object, other: object) -> Any:
     """Return the distances of all points of one list from all of another."""
     a, b = traced(np.graph, one), traced(np.graph, other)
     apart = a[:, None, :] - b[None, :, :]
@@ -81,7 +87,7 @@ def _distances(np: Facade, one: Any, other: Any) -> Any:
 def _of_linalg(name: str) -> Any:
     written = WRITTEN[getattr(np.linalg, name)]
 
-    def function(graph: Graph, *arguments: Any, **options: Any) -> Any:
+    def function(graph: Graph, *arguments: object, **options: object) -> Any:
         if name == "cholesky":
             lower = options.pop("lower", False)
             a = traced(graph, arguments[0])  # SciPy reads the triangle that it returns
@@ -96,17 +102,17 @@ def _of_linalg(name: str) -> Any:
 _HOW = ("assume_a", "check_finite", "overwrite_a", "overwrite_b")  # how, not what
 
 
-def _elementwise(name: str, graph: Graph, x: Any) -> Tracer:
+def _elementwise(name: str, graph: Graph, x: object) -> Tracer:
     return elementwise(graph, name, x)
 
 
-def softmax(np: Facade, x: Any, axis: object = None) -> Any:
+def softmax(np: Facade, x: object, axis: object = None) -> Any:
     """e^x, divided by the sum of all."""
     e = np.exp(x - np.max(x, axis=axis, keepdims=True))
     return e / np.sum(e, axis=axis, keepdims=True)
 
 
-def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
+def logsumexp(np: Facade, a: object, axis: object = None) -> Any:
     """ln of the sum of e^a."""
     top = np.max(a, axis=axis, keepdims=True)
     top = np.where(np.isfinite(top), top, 0.0)
@@ -114,14 +120,14 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     return logarithm + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
 
 
-def huber(np: Facade, delta: Any, r: Any) -> Any:
+def huber(np: Facade, delta: Any, r: Arithmetic) -> Any:
     """r^2 / 2 up to |r| = delta, linear beyond."""
     size = np.abs(r)
     near = np.where(size <= delta, 0.5 * r * r, delta * (size - 0.5 * delta))
     return np.where(delta < 0.0, math.inf, near)
 
 
-def pseudo_huber(np: Facade, delta: Any, r: Any) -> Any:
+def pseudo_huber(np: Facade, delta: Any, r: object) -> Any:
     """As huber, and smooth."""
     share = r / np.where(delta == 0.0, 1.0, delta)
     smooth = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
@@ -147,7 +153,7 @@ _FORMULAS = {
 
 
 def _whole(name: str) -> Any:
-    def written(graph: Graph, x: Any) -> Any:
+    def written(graph: Graph, x: object) -> Any:
         value = traced(graph, x)
         if value.shape:
             raise Untraceable("a function of math of an array")
@@ -163,7 +169,7 @@ of(math.trunc)(_whole("trunc"))
 
 
 @formula(math.dist)
-def dist(np: Facade, p: Any, q: Any) -> Tracer:
+def dist(np: Facade, p: object, q: object) -> Tracer:
     """Return the distance of two points."""
     apart = np.subtract(traced(np.graph, p), traced(np.graph, q))
     return np.sqrt(np.sum(apart * apart))
@@ -176,7 +182,7 @@ of(math.prod)(
 
 
 @formula(math.remainder)
-def ieee_remainder(np: Facade, x: Any, y: Any) -> Tracer:
+def ieee_remainder(np: Facade, x: object, y: object) -> Tracer:
     """Return what the nearest multiple of y leaves of x; of two equally far the even one."""
     size = np.abs(y)
     rest, half = np.fmod(x, size), 0.5 * size
@@ -187,7 +193,9 @@ def ieee_remainder(np: Facade, x: Any, y: Any) -> Tracer:
 
 
 @formula(math.isclose)
-def _isclose(np: Facade, a: Any, b: Any, *, rel_tol: Any = 1e-9, abs_tol: Any = 0.0) -> Any:
+def _isclose(
+    np: Facade, a: object, b: object, *, rel_tol: float = 1e-9, abs_tol: float = 0.0
+) -> Any:
     """Return whether a is next to b."""
     scale = np.maximum(np.abs(a), np.abs(b))
     near = np.abs(np.subtract(a, b)) <= np.maximum(rel_tol * scale, abs_tol)

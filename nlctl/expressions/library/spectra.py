@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import traced
 from ..graph import Graph, Untraceable
 from .complex_numbers import ComplexPair
@@ -15,7 +16,7 @@ from .table import Facade, constant_value, of
 __all__: list[str] = []
 
 
-def _matrix(graph: Graph, a: Any) -> Any:
+def _matrix(graph: Graph, a: object) -> Any:
     array = traced(graph, a)
     if array.ndim != 2:
         raise Untraceable("many matrices at once")
@@ -23,7 +24,7 @@ def _matrix(graph: Graph, a: Any) -> Any:
 
 
 @of(np.linalg.eigvals)
-def eigvals(graph: Graph, a: Any) -> Any:
+def eigvals(graph: Graph, a: object) -> Any:
     """Return the eigenvalues of a matrix of two rows, in the order that LAPACK has them."""
     matrix, np_ = _matrix(graph, a), Facade(graph)
     if isinstance(numbers := constant_value(matrix), np.ndarray):
@@ -47,7 +48,7 @@ def eigvals(graph: Graph, a: Any) -> Any:
 
 
 @of(np.linalg.pinv)
-def pinv(graph: Graph, a: Any, rcond: float = 1e-15) -> Any:
+def pinv(graph: Graph, a: object, rcond: float = 1e-15) -> Any:
     """Return the pseudoinverse of a matrix of at most two rows or columns."""
     matrix = _matrix(graph, a)
     if isinstance(numbers := constant_value(matrix), np.ndarray):
@@ -71,7 +72,9 @@ def _of_lines(np_: Facade, columns: Sequence[Any]) -> list[Any]:
     return [c * weight for c in columns]
 
 
-def _of_two(np_: Facade, a: Any, b: Any, parallel: Sequence[Any], rcond: float) -> list[Any]:
+def _of_two(
+    np_: Facade, a: Arithmetic, b: object, parallel: Sequence[Any], rcond: float
+) -> list[Any]:
     """Return the pseudoinverse of two columns, by an orthogonal one for each."""
     size = np_.sqrt(np_.sum(a * a))
     first = a / np_.where(size == 0.0, 1.0, size)

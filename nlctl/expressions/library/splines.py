@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .surfaces import surface
@@ -15,12 +16,12 @@ from .table import enter
 from .tables import MOST_PIECES, constant_cells, interval_choice, interval_polynomial, polynomial
 
 
-def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
+def called_object(graph: Graph, interpolant: object, *arguments: object, **options: object) -> Any:
     """Return what an object of a library, that can be called, makes of arrays of expressions."""
     for kinds, written in _kinds():
-        if isinstance(thing, kinds):
-            return written(graph, thing, *arguments, **options)
-    raise Untraceable(f"{type(thing).__name__} is not known here")
+        if isinstance(interpolant, kinds):
+            return written(graph, interpolant, *arguments, **options)
+    raise Untraceable(f"{type(interpolant).__name__} is not known here")
 
 
 _POLYNOMIALS = ("Polynomial", "Chebyshev", "Legendre", "Hermite", "HermiteE", "Laguerre")
@@ -51,7 +52,7 @@ def enter_splines() -> None:
     enter([interpolate.interpn], at_grid)
 
 
-def _floats(values: Any) -> np.ndarray:
+def _floats(values: object) -> np.ndarray:
     return np.asarray(values, dtype=float)
 
 
@@ -61,21 +62,21 @@ def _mapped_polynomial(graph: Graph, p: Any, x: Any) -> Any:
     return polynomial(graph, float(off) + float(scale) * traced(graph, x), _floats(p.coef))
 
 
-def _elementwise(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
+def _elementwise(graph: Graph, x: object, function: Callable[[Expr], Expr]) -> Tracer:
     cells = mapped(lambda e: function(graph.number(e)), traced(graph, x).elements())
     return Tracer(graph, cells)
 
 
 def piecewise_polynomial(
-    graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None
+    graph: Graph, interpolant: Any, x: Arithmetic, nu: int = 0, extrapolate: Any = None
 ) -> Any:
     """Return SciPy's piecewise polynomial, or a derivative."""
     if nu:
-        thing = thing.derivative(nu)
-    extrapolate = thing.extrapolate if extrapolate is None else extrapolate
-    if thing.c.ndim != 2 or thing.c.dtype != float or extrapolate == "periodic":
+        interpolant = interpolant.derivative(nu)
+    extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
+    if interpolant.c.ndim != 2 or interpolant.c.dtype != float or extrapolate == "periodic":
         raise Untraceable("a piecewise polynomial with several values, or with a period")
-    breaks, coefficients = thing.x, thing.c
+    breaks, coefficients = interpolant.x, interpolant.c
     if breaks.size > MOST_PIECES or np.any(np.diff(breaks) <= 0):
         raise Untraceable("a piecewise polynomial with too many pieces")
 
@@ -101,21 +102,21 @@ def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
     graph.guards.append(graph.op("le", x, graph.const(float(ends[-1]))))
 
 
-def b_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None) -> Any:
+def b_spline(graph: Graph, interpolant: Any, x: Any, nu: int = 0, extrapolate: Any = None) -> Any:
     """Return SciPy's spline by its polynomial in each interval between knots."""
     from scipy.interpolate import PPoly
 
-    extrapolate = thing.extrapolate if extrapolate is None else extrapolate
-    if thing.c.ndim != 1 or extrapolate == "periodic":
+    extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
+    if interpolant.c.ndim != 1 or extrapolate == "periodic":
         raise Untraceable("a spline with several values, or with a period")
-    knots = np.unique(thing.t[thing.k : thing.t.size - thing.k])
-    whole = PPoly.from_spline(thing)
+    knots = np.unique(interpolant.t[interpolant.k : interpolant.t.size - interpolant.k])
+    whole = PPoly.from_spline(interpolant)
     kept = [int(np.searchsorted(whole.x, k, side="right")) - 1 for k in knots[:-1]]
     unwrapped = PPoly(whole.c[:, kept], knots, extrapolate=bool(extrapolate))
     return piecewise_polynomial(graph, unwrapped, x, nu)
 
 
-def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
+def splev(graph: Graph, x: object, tck: Any, der: int = 0, ext: int = 0) -> Any:
     """Return a spline that is given by knots, coefficients and degree."""
     from scipy.interpolate import BSpline
 
@@ -142,7 +143,7 @@ def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
     return Tracer(graph, cells)
 
 
-def _numbers(values: Any) -> Any:
+def _numbers(values: object) -> Any:
     from .table import constant_value
 
     constant = constant_value(values) if isinstance(values, Tracer) else values
@@ -151,34 +152,36 @@ def _numbers(values: Any) -> Any:
     return constant
 
 
-def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None) -> Any:
+def fitted_spline(
+    graph: Graph, interpolant: Any, x: Arithmetic, nu: int = 0, ext: Any = None
+) -> Any:
     """Return one of SciPy's splines that are fitted to data."""
     codes = {"extrapolate": 0, "zeros": 1, "raise": 2, "const": 3}
-    how = thing.ext if ext is None else ext
+    how = interpolant.ext if ext is None else ext
     code: Any = codes.get(how, how)
-    return splev(graph, x, thing._eval_args, nu, code)
+    return splev(graph, x, interpolant._eval_args, nu, code)
 
 
-def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
+def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
     """Return SciPy's interp1d."""
-    kind = getattr(thing, "_kind", "")
-    values = np.asarray(thing.y, dtype=float)
+    kind = getattr(interpolant, "_kind", "")
+    values = np.asarray(interpolant.y, dtype=float)
     if values.ndim != 1:
         raise Untraceable("a table with several values")
-    if kind in ("linear", "linear-np", "slinear") and not hasattr(thing, "_spline"):
-        lines = np.stack([np.diff(values) / np.diff(thing.x), values[:-1]], axis=1)
-        rule = lambda e: interval_polynomial(graph, e, thing.x, lines)  # noqa: E731
-    elif hasattr(thing, "_spline"):
-        spline = _of_one_value(thing._spline)
+    if kind in ("linear", "linear-np", "slinear") and not hasattr(interpolant, "_spline"):
+        lines = np.stack([np.diff(values) / np.diff(interpolant.x), values[:-1]], axis=1)
+        rule = lambda e: interval_polynomial(graph, e, interpolant.x, lines)  # noqa: E731
+    elif hasattr(interpolant, "_spline"):
+        spline = _of_one_value(interpolant._spline)
         rule = lambda e: b_spline(graph, spline, scalar(graph, e), 0, True).only  # noqa: E731
     else:
         raise Untraceable(f"interp1d of kind {kind!r}")
-    extrapolates, bounded = bool(thing._extrapolate), bool(thing.bounds_error)
+    extrapolates, bounded = bool(interpolant._extrapolate), bool(interpolant.bounds_error)
     below, above = (graph.const(float(np.ravel(v)[0])) if not extrapolates else None
-                    for v in _fill(thing))  # fmt: skip
+                    for v in _fill(interpolant))  # fmt: skip
 
     def at(e: Expr) -> Expr:
-        value, ends = rule(e), (thing.x[0], thing.x[-1])
+        value, ends = rule(e), (interpolant.x[0], interpolant.x[-1])
         if bounded:
             _guard_range(graph, e, ends)
         if extrapolates or below is None or above is None:
@@ -195,23 +198,23 @@ def _of_one_value(spline: Any) -> Any:
     return BSpline(spline.t, spline.c.reshape(len(spline.c), -1)[:, 0], spline.k)
 
 
-def _fill(thing: Any) -> tuple[Any, Any]:
-    if thing._extrapolate:
+def _fill(interpolant: Any) -> tuple[Any, Any]:
+    if interpolant._extrapolate:
         return None, None
-    return thing._fill_value_below, thing._fill_value_above
+    return interpolant._fill_value_below, interpolant._fill_value_above
 
 
-def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
+def _grid(graph: Graph, interpolant: Any, xi: object, method: Any = None) -> Any:
     """Return SciPy's interpolation on a grid: linear along one axis after the other."""
-    values = np.asarray(thing.values, dtype=float)
-    if (method or thing.method) != "linear" or values.ndim != len(thing.grid):
+    values = np.asarray(interpolant.values, dtype=float)
+    if (method or interpolant.method) != "linear" or values.ndim != len(interpolant.grid):
         raise Untraceable("an interpolation on a grid that is not linear")
     array = traced(graph, list(xi) if isinstance(xi, tuple) else xi)
     flat = isinstance(xi, tuple) and array.ndim == 1
     rows = array.short().reshape(1, -1) if array.ndim == 1 else array.short()
     if isinstance(xi, tuple) and array.ndim > 1:
         raise Untraceable("an interpolation on a grid at several points")
-    results = [_on_grid(graph, thing, values, [graph.number(e) for e in row.elements()])
+    results = [_on_grid(graph, interpolant, values, [graph.number(e) for e in row.elements()])
              for row in rows]  # fmt: skip
     cells = np.empty(len(results), dtype=object)
     cells[:] = results
@@ -219,7 +222,9 @@ def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
     return whole[0] if flat else whole
 
 
-def at_grid(graph: Graph, points: Any, values: Any, xi: Any, *rest: Any, **options: Any) -> Any:
+def at_grid(
+    graph: Graph, points: Any, values: object, xi: object, *rest: Any, **options: object
+) -> Any:
     """Return SciPy's `interpn`."""
     from scipy.interpolate import RegularGridInterpolator
 
@@ -227,21 +232,21 @@ def at_grid(graph: Graph, points: Any, values: Any, xi: Any, *rest: Any, **optio
     return _grid(graph, RegularGridInterpolator(places, _numbers(values), *rest, **options), xi)
 
 
-def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) -> Expr:
+def _on_grid(graph: Graph, interpolant: Any, values: np.ndarray, x: Sequence[Expr]) -> Expr:
     cells: Any = constant_cells(graph, values)
     for axis in range(len(x) - 1, -1, -1):
-        places = np.asarray(thing.grid[axis], dtype=float)
+        places = np.asarray(interpolant.grid[axis], dtype=float)
         reduced = np.empty(cells.shape[:-1], dtype=object)
         for index in np.ndindex(reduced.shape):
             reduced[index] = _between(graph, places, cells[index], x[axis])
         cells = reduced
     value: Any = cells[()] if isinstance(cells, np.ndarray) else cells
     for axis, e in enumerate(x):
-        ends = thing.grid[axis][0], thing.grid[axis][-1]
-        if thing.bounds_error:
+        ends = interpolant.grid[axis][0], interpolant.grid[axis][-1]
+        if interpolant.bounds_error:
             _guard_range(graph, e, ends)
-        elif thing.fill_value is not None:
-            fill = graph.const(float(thing.fill_value))
+        elif interpolant.fill_value is not None:
+            fill = graph.const(float(interpolant.fill_value))
             value = _beyond(graph, e, ends, value, fill, fill)
     return value
 

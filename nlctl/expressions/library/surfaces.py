@@ -13,13 +13,13 @@ from .tables import MOST_PIECES, constant_cells, interval_polynomial
 
 
 def surface(
-    graph: Graph, thing: Any, x: Any, y: Any, dx: int = 0, dy: int = 0, grid: bool = True
+    graph: Graph, spline: Any, x: object, y: object, dx: int = 0, dy: int = 0, grid: bool = True
 ) -> Tracer:
     """Return SciPy's spline of two variables; beyond its ends it is what it is there."""
-    if dx or dy or len(thing.tck) != 3:
+    if dx or dy or len(spline.tck) != 3:
         raise Untraceable("a derivative of a spline of two variables")
-    tx, ty, c = (np.asarray(v, dtype=float) for v in thing.tck)
-    axes = [_axis(t, k) for t, k in zip((tx, ty), thing.degrees, strict=True)]
+    tx, ty, c = (np.asarray(v, dtype=float) for v in spline.tck)
+    axes = [_axis(t, k) for t, k in zip((tx, ty), spline.degrees, strict=True)]
     coefficients = c.reshape(axes[0][1].shape[0], -1)
     if coefficients.size > MOST_PIECES:
         raise Untraceable("a spline of two variables with too many pieces")
@@ -29,7 +29,7 @@ def surface(
     elif xs.shape != ys.shape:
         raise Untraceable("a spline of two variables at arrays of different shapes")
     clipped = [mapped(_clipped(graph, t, k), v.elements()) for v, t, k in
-               zip((xs, ys), (tx, ty), thing.degrees, strict=True)]  # fmt: skip
+               zip((xs, ys), (tx, ty), spline.degrees, strict=True)]  # fmt: skip
     return Tracer(graph, mapped(lambda e, f: _at(graph, axes, coefficients, e, f), *clipped))
 
 

@@ -21,21 +21,21 @@ UFUNC_OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for na
 UFUNC_OPERATIONS["divide"] = "div"  # of the name of a ufunc: the operation of expressions
 
 
-def of(*functions: Any, makes: bool = False) -> Callable[[Any], Any]:
+def of(*functions: object, makes: bool = False) -> Callable[[Any], Any]:
     """Enter a function of a graph and arguments into the table."""
 
-    def entered(written: Any) -> Any:
+    def entered(written: Callable[..., Any]) -> Any:
         enter(functions, written, makes=makes)
         return written
 
     return entered
 
 
-def formula(*functions: Any) -> Callable[[Any], Any]:
+def formula(*functions: object) -> Callable[[Any], Any]:
     """Enter a function that is a formula of others, which it takes from its first argument."""
 
-    def entered(written: Any) -> Any:
-        def of_graph(graph: Graph, *rest: Any, **named: Any) -> Any:
+    def entered(written: Callable[..., Any]) -> Any:
+        def of_graph(graph: Graph, *rest: object, **named: Any) -> Any:
             arrays = [traced(graph, v) if isinstance(v, list) else v for v in rest]
             return written(Facade(graph), *arrays, **named)
 
@@ -59,7 +59,7 @@ class NumberType:
     def __init__(self, real: type, make: Callable[..., Any]) -> None:
         self.real, self.make = real, make
 
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
+    def __call__(self, *arguments: object, **options: object) -> Any:
         return self.make(*arguments, **options)
 
     def __getattr__(self, name: str) -> Any:
@@ -107,7 +107,7 @@ class Facade:
         return lambda *arguments, **options: written_out(self.graph, real, *arguments, **options)
 
 
-def written_out(graph: Graph, function: Any, *arguments: Any, **options: Any) -> Any:
+def written_out(graph: Graph, function: object, *arguments: object, **options: object) -> Any:
     """Return a function of a library of arrays of expressions."""
     if function in WRITTEN:
         return WRITTEN[function](graph, *arguments, **options)
@@ -118,7 +118,11 @@ def written_out(graph: Graph, function: Any, *arguments: Any, **options: Any) ->
 
 
 def of_ufunc(
-    graph: Graph, function: Any, written: Callable[..., Any], arguments: Any, options: Any
+    graph: Graph,
+    function: Callable[..., Any],
+    written: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    options: Any,
 ) -> Any:
     """Return a ufunc, with the options that all have."""
     count = function.nin

@@ -18,7 +18,7 @@ __all__: list[str] = []
 MOST_PIECES = 256
 
 
-def _constants(graph: Graph, values: Any, what: str) -> np.ndarray:
+def _constants(graph: Graph, values: object, what: str) -> np.ndarray:
     """Return what must be known when a function is traced."""
     array = traced(graph, values)
     elements = array.elements()
@@ -64,7 +64,13 @@ def interval_polynomial(
 
 @of(np.interp)
 def interp(
-    graph: Graph, x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None
+    graph: Graph,
+    x: object,
+    xp: object,
+    fp: object,
+    left: object = None,
+    right: object = None,
+    period: object = None,
 ) -> Tracer:
     """Return a piecewise linear function, its ends beyond the table."""
     places = _constants(graph, xp, "places of a table")
@@ -109,7 +115,9 @@ def _place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
 
 
 @of(np.searchsorted)
-def searchsorted(graph: Graph, a: Any, v: Any, side: str = "left", sorter: Any = None) -> Tracer:
+def searchsorted(
+    graph: Graph, a: object, v: object, side: str = "left", sorter: object = None
+) -> Tracer:
     """Return where values belong in an ordered table."""
     bounds = _constants(graph, a, "places of a table")
     if sorter is not None or np.any(np.diff(bounds) < 0):
@@ -120,13 +128,13 @@ def searchsorted(graph: Graph, a: Any, v: Any, side: str = "left", sorter: Any =
 
 
 @of(np.digitize)
-def digitize(graph: Graph, x: Any, bins: Any, right: bool = False) -> Tracer:
+def digitize(graph: Graph, x: object, bins: object, right: bool = False) -> Tracer:
     """Return in which bin values are."""
     return searchsorted(graph, bins, x, "left" if right else "right")
 
 
 def _bisected(side: str) -> Callable[..., Any]:
-    def written(graph: Graph, a: Any, x: Any) -> Any:
+    def written(graph: Graph, a: object, x: object) -> Any:
         if traced(graph, x).shape:
             raise Untraceable("a bisection for an array")
         bounds, guard = _constants(graph, a, "places of a table"), traced(graph, x)
@@ -141,7 +149,7 @@ of(bisect.bisect_right)(_bisected("right"))
 
 
 @of(np.polynomial.polynomial.polyval)
-def polynomial(graph: Graph, x: Any, c: Any, tensor: bool = True) -> Any:
+def polynomial(graph: Graph, x: object, c: object, tensor: bool = True) -> Any:
     """Return a polynomial by its coefficients, the constant first."""
     x, coefficients = traced(graph, x), list(traced(graph, c))
     value = coefficients[-1] + x * 0.0

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from ..integrate.state import METHOD, RUNNING
+from ..integrate.workspace import Task, Work
 from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
@@ -76,12 +77,12 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     return whole & ((due[0] & (windows >= _LONG)) | ((slow > 0) & due[1]))
 
 
-def probe_of(task: Any) -> int:
+def probe_of(task: Task) -> int:
     """Return how many steps are looked at, at the end of a window of a run."""
     return PROBE * (_PROBES if task.taylor.highest else 1)
 
 
-def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
+def snapshot(work: Work, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
     """Try one step; return what `advance` returns, and the step."""
     t, x, first = work.lanes["t"].copy(), work.x.copy(), work.k[0].copy()
     run = advance()

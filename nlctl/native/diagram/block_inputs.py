@@ -21,7 +21,7 @@ def block_inputs(
 
 
 def _walked(
-    system: Any, u: np.ndarray, outputs: Sequence[np.ndarray]
+    system: System, u: np.ndarray, outputs: Sequence[np.ndarray]
 ) -> tuple[list[tuple[Any, np.ndarray]], np.ndarray]:
     """Return the blocks of a part with their inputs, and its outputs, given those of all blocks."""
     if not isinstance(system, ct.InterconnectedSystem):

@@ -75,7 +75,7 @@ def _functions(system: System) -> Iterator[tuple[str, Any]]:
                 yield name, getattr(system.spec, name)
 
 
-def _check_counts(path: str, system: Any) -> None:
+def _check_counts(path: str, system: ct.NonlinearIOSystem) -> None:
     """Call a block's functions once: as many values must come back as there are signals."""
     calls = [("update", rates_now, system.nstates, "states")] if system.nstates else []
     if system.outfcn is not None and system.noutputs:
@@ -101,7 +101,7 @@ def _check_counts(path: str, system: Any) -> None:
 # -- blocks that do not say how many signals they have ---------------------------------------------
 
 
-def sized(system: System, inputs: Any, initial_state: Any) -> Any:
+def sized(system: System, inputs: object, initial_state: object) -> Any:
     """Return a block with the numbers of states, inputs and outputs that a run gives it."""
     # python-control takes them from the run's arguments where a block does not declare them.
     counts = (system.nstates, system.ninputs, system.noutputs)

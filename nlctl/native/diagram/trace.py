@@ -74,7 +74,7 @@ def dependence(
     return structure(list(result.pieces()), "u", system.ninputs or 0)
 
 
-def feedthrough(system: Any) -> np.ndarray:
+def feedthrough(system: ct.NonlinearIOSystem) -> np.ndarray:
     """Return which outputs depend directly on which inputs."""
     # nlctl's blocks declare it, linear systems have their D matrix, and the output functions of
     # others are traced: what reaches an output in their expressions is depended on, whatever the
@@ -90,7 +90,7 @@ def feedthrough(system: Any) -> np.ndarray:
     return _traced(system)
 
 
-def closer_feedthrough(system: Any, direct: np.ndarray) -> np.ndarray:
+def closer_feedthrough(system: object, direct: np.ndarray) -> np.ndarray:
     """Return which entries of `direct` are there in the expressions of a block of nlctl."""
     return direct & _traced(system) if isinstance(system, Block) and direct.any() else direct
 

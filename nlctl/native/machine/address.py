@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -11,7 +12,7 @@ from numba import types
 from ...upstream.numba_internals import infer_global, make_intrinsic_template
 
 
-def by_address(function: Any) -> Any:
+def by_address(function: Callable[..., Any]) -> Any:
     """Have machine code call an address where Python calls the function that is given first."""
 
     def definition(typing_context, address, *arrays):

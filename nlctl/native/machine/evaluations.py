@@ -61,7 +61,9 @@ class Machine:
         """What integrators take of `rhs` and `out`."""
         return entry(self.rhs), entry(self.out)
 
-    def values(self, function: Any, names: str, point: Any, c: np.ndarray) -> list[np.ndarray]:
+    def values(
+        self, function: Callable[..., Any], names: str, point: Any, c: np.ndarray
+    ) -> list[np.ndarray]:
         """Return what a function makes of t, x and u, `c` in every lane: arrays of these names."""
         t, x, u = (np.ascontiguousarray(v, dtype=float).reshape(-1, 1) for v in point)
         if self.width > 1:
@@ -139,12 +141,14 @@ def evaluations(reading: Reading) -> tuple[Callable[..., None], Callable[..., No
     """Return ``rhs(t, x, u, p, dx, g, m)`` and ``out(t, x, u, p, y)`` of flat vectors."""
     machine(reading, reading.parameter_vector()[:, None])
 
-    def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: Any, g: Any, m: Any) -> None:
+    def rhs(
+        t: float, x: object, u: object, p: np.ndarray, dx: np.ndarray, g: np.ndarray, m: np.ndarray
+    ) -> None:
         code, c = prepared_parameters(reading, p)
         dx[:], events, m[:] = code.values(code.rhs, "dx g m", (t, x, u), c)
         g[:] = events if events.size == g.size else np.nan  # integers steer what switches
 
-    def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
+    def out(t: float, x: object, u: object, p: np.ndarray, y: np.ndarray) -> None:
         code, c = prepared_parameters(reading, p)
         (y[:],) = code.values(code.out, "y", (t, x, u), c)
 

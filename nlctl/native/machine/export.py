@@ -77,7 +77,7 @@ def exported(requests: Sequence[Wanted]) -> bytes:
     return lzma.compress(_apart(module, names.values()).as_bitcode(), preset=9)
 
 
-def _reach(library: Any, reached: dict[int, Any]) -> None:
+def _reach(library: object, reached: dict[int, Any]) -> None:
     """Add a library and all that it calls."""
     if id(library) not in reached:
         reached[id(library)] = library
@@ -134,7 +134,7 @@ def _apart(module: Any, entries: Iterable[str]) -> Any:
     return llvm.parse_assembly(text)
 
 
-def _builder(machine: Any, speed: int) -> Any:
+def _builder(machine: object, speed: int) -> Any:
     options = llvm.create_pipeline_tuning_options(speed)
     options.loop_vectorization = options.slp_vectorization = False
     return llvm.create_pass_builder(machine, options)

@@ -86,24 +86,24 @@ def program_key(program: Sourced) -> str:
     return function_key(program.source, *(x for name in sorted(parts) for x in (name, parts[name])))
 
 
-def function_key(*things: Any) -> str:
+def function_key(*things: object) -> str:
     """Return a key of functions, and of other things that their machine code depends on."""
     seen = _Seen(deep=False)
     return _digest_of(text for thing in things for text in _fingerprint(thing, seen))
 
 
-def content_key(*things: Any) -> str:
+def content_key(*things: object) -> str:
     """Return a key of what functions compute: the same wherever their files are."""
     # Unlike `function_key` it is the same for functions of the same content in different modules.
     return content_of(*things)[0]
 
 
-def unseen_in(*things: Any) -> list[str]:
+def unseen_in(*things: object) -> list[str]:
     """Return what `content_key` cannot see of functions: another content has the same key."""
     return content_of(*things)[1]
 
 
-def content_of(*things: Any) -> tuple[str, list[str]]:
+def content_of(*things: object) -> tuple[str, list[str]]:
     """Return a key of what functions compute, and what it cannot see of them."""
     seen = _Seen(deep=True)  # into objects of libraries as well
     texts = [text for thing in things for text in _fingerprint(thing, seen)]
@@ -328,7 +328,7 @@ def _of_library_object(thing: object, seen: _Seen) -> Iterator[str]:
         yield from _of_held(thing, held_by(thing, _is_library), seen)
 
 
-def _of_held(thing: object, held: Any, seen: _Seen) -> Iterator[str]:
+def _of_held(thing: object, held: object, seen: _Seen) -> Iterator[str]:
     if held is None:
         yield _constant(thing)
     elif isinstance(held, str):

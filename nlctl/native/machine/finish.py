@@ -90,7 +90,7 @@ def _object_code(source: str | bytes) -> bytes:
     return _emitted(llvm.parse_bitcode(lzma.decompress(source)), machine, passes, builder)
 
 
-def program_code(text: str, machine: Any) -> bytes:
+def program_code(text: str, machine: object) -> bytes:
     """Return the IR of a program as object code for a machine of LLVM's."""
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
     passes = llvm.create_new_module_pass_manager()

@@ -94,35 +94,35 @@ def kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 class _Given(CodeCache):
     """Gives numba the code of one function, or takes it."""
 
-    def __init__(self, data: Any) -> None:
+    def __init__(self, data: object) -> None:
         self.data, self.is_new = data, False
 
-    def load(self, signature: Any) -> Any:
+    def load(self, signature: object) -> Any:
         return self.data
 
-    def save(self, signature: Any, data: Any) -> None:
+    def save(self, signature: object, data: object) -> None:
         self.data, self.is_new = data, True
 
 
 class _ByArguments(CodeCache):
     """Gives numba the code of a function for given types of arguments, or takes it."""
 
-    def __init__(self, code: Any) -> None:
+    def __init__(self, code: object) -> None:
         self.code = code
 
     @functools.cached_property
     def key(self) -> str:
         return function_key(self.code)
 
-    def load(self, signature: Any) -> Any:
+    def load(self, signature: object) -> Any:
         known = _read(store_key(self.key, str(signature)))
         return None if known is None else known[0]
 
-    def save(self, signature: Any, data: Any) -> None:
+    def save(self, signature: object, data: object) -> None:
         _write(store_key(self.key, str(signature)), [data])
 
 
-def store_key(key: str, *more: Any) -> str:
+def store_key(key: str, *more: object) -> str:
     """Return the key of what was compiled by this numba, for this processor, with its settings."""
     python = sys.implementation.cache_tag, platform.python_version()
     versions = numba.__version__, llvmlite.__version__, np.__version__

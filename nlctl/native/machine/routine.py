@@ -106,7 +106,7 @@ def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Rou
     )
 
 
-def entry(function: Any) -> Any:
+def entry(function: object) -> Any:
     """Return what integrators take: the address of machine code, or a plain function."""
     return function.address if isinstance(function, Routine) else function
 

@@ -25,6 +25,7 @@ from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ...upstream.systems import System
 from ...wording import counted
+from ..diagram.nodes import Node
 from ..diagram.parameters import Slot, current_values
 from ..purity import dicts
 from ..purity.dicts import (
@@ -90,7 +91,7 @@ class Call:
 
 
 def call_of(
-    name: str, node: Any, kind: str, functions: Sequence[Any], slots: Mapping[str, Slot],
+    name: str, node: Node, kind: str, functions: Sequence[Any], slots: Mapping[str, Slot],
     count: int, reason: str,
 ) -> Call:  # fmt: skip
     """Return a call of a block's functions."""
@@ -150,7 +151,7 @@ class _AsItStands:
             )
         return values
 
-    def _numbers(self, values: Any) -> np.ndarray:
+    def _numbers(self, values: object) -> np.ndarray:
         """Return what a function returns as a vector; what is not a number is refused."""
         array = np.asarray(values).reshape(-1)
         if array.dtype.kind not in "biufc":
@@ -231,7 +232,7 @@ def _counts(stands: _AsItStands, count: int) -> list[int]:
     return [int(np.size(f(0.0, x, u, params))) for f in stands.functions]
 
 
-def _as_tuples(system: System, function: Any) -> set[int]:
+def _as_tuples(system: System, function: object) -> set[int]:
     """Return which arguments a function wants as tuples: x (1) and u (2)."""
     if isinstance(system, Block):
         return set() if getattr(system.spec, "vector", False) else {1, 2}
@@ -245,7 +246,7 @@ def _given(first: int, size: int, as_tuple: bool) -> str:
     return f"({', '.join(items)}{',' if size == 1 else ''})"
 
 
-def _jitted(function: Any) -> Any:
+def _jitted(function: object) -> Any:
     """Make a function callable from machine code; equations already are."""
     if isinstance(function, CPUDispatcher):
         return function

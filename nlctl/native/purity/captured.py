@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from array import array
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, compress
 from operator import getitem, is_, not_
@@ -32,7 +32,7 @@ class Captured:
 
     holder: Any  # what it is read from: a closure's cell, a module's names, an object
     name: str  # name in the holder
-    then: Any  # what it was: a copy, where it can change in place
+    then: Callable[..., Any]  # what it was: a copy, where it can change in place
 
     @property
     def now(self) -> Any:
@@ -53,7 +53,7 @@ class Captured:
         return f"{name}.{self.name}" if name else self.name
 
 
-def in_cell(cell: CellType, empty: Any = None) -> Any:
+def in_cell(cell: CellType, empty: object = None) -> Any:
     """Return what is in the cell of a closure, something else if it is not filled."""
     try:
         return cell.cell_contents
@@ -122,7 +122,7 @@ def recorded(value: Any) -> Any:
     return value.copy() if _is_table(value) else value
 
 
-def _is_table(value: Any) -> bool:
+def _is_table(value: object) -> bool:
     return type(value).__module__.startswith("pandas") and hasattr(value, "equals")
 
 

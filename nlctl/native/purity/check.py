@@ -61,7 +61,7 @@ class FunctionReading:
     messages: tuple[Message, ...]
 
 
-def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReading:
+def check_pure(function: object, arguments: Sequence[KnownValue]) -> FunctionReading:
     """Check that a function depends on its arguments alone and changes nothing."""
     plain = python_function(function)
     if plain is not None and inspect.isgeneratorfunction(plain):

@@ -48,7 +48,7 @@ def params_record(path: str, names: Sequence[str]) -> type:
         ) from None
 
 
-def unpacked_arguments(function: Any) -> set[int]:
+def unpacked_arguments(function: object) -> set[int]:
     """Return the positions of the arguments that a function takes apart, as in ``a, b = x``."""
     bound = 0
     while isinstance(function, functools.partial):
@@ -103,7 +103,7 @@ def callable_constant(value: object) -> Any:
 class Params(types.Type):
     """Type of a parameter dict in machine code: a named tuple, read by keys."""
 
-    def __init__(self, values: Any) -> None:
+    def __init__(self, values: types.NamedTuple) -> None:
         self.values = values
         super().__init__(name=f"Params({values})")
 

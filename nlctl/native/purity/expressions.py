@@ -6,7 +6,7 @@ import ast
 import enum
 import functools
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
@@ -61,7 +61,7 @@ class Frame:
     """The names of one call."""
 
     names: dict[str, KnownValue]
-    function: Any  # the plain function that is called, or around it
+    function: Callable[..., Any]  # the plain function that is called, or around it
     parent: Frame | None = None
     shared: dict[str, str] = field(default_factory=dict)  # declared global or nonlocal
     unbound: set[str] = field(default_factory=set)  # without a value on one of the ways so far

@@ -10,7 +10,7 @@ import collections
 import dataclasses
 import enum
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import FunctionType
 from typing import Any, Generic, Protocol
 
@@ -65,7 +65,7 @@ def _check_plain(cls: type) -> None:
         raise Impure(f"makes an object of {cls.__name__}", "use numbers and arrays")
 
 
-def _is_generated(start: Any) -> bool:
+def _is_generated(start: object) -> bool:
     return isinstance(start, FunctionType) and start.__code__.co_filename == "<string>"
 
 
@@ -88,7 +88,7 @@ def _of_fields(walk: Walk, new: Instance, given: Given) -> None:
         new.learn(field.name, value)
 
 
-def walk_tuple(walk: Walk, cls: Any) -> None:
+def walk_tuple(walk: Walk, cls: type) -> None:
     """Walk the properties and operators of a named tuple: it is a value like others later."""
     if cls in walk.tuples:
         return
@@ -154,7 +154,7 @@ def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
     return OUTSIDE
 
 
-def of_class(walk: Walk, base: KnownValue, member: Any) -> KnownValue:
+def of_class(walk: Walk, base: KnownValue, member: Callable[..., Any]) -> KnownValue:
     """Return what is known of what an object finds in its class."""
     if isinstance(member, property):
         return walk.call(captured(member.fget), Given((base,)))

@@ -28,7 +28,7 @@ UNDERSTOOD = (
 )  # fmt: skip
 
 
-def frozen(function: Any) -> Any:
+def frozen(function: object) -> Any:
     """Return a function with constants instead of the objects that it reads."""
     # Methods, `functools.partial` and objects that can be called become functions as well. What
     # cannot be replaced stays as it is, and numba will say so.
@@ -76,7 +76,7 @@ def _with(
     return copied
 
 
-def _method(function: Any, owner: object) -> Any:
+def _method(function: object, owner: object) -> Any:
     """Return a method as a function of ``(t, x, u, params)``; None where it stays a method."""
     if not isinstance(function, FunctionType):
         return None
@@ -92,7 +92,7 @@ def _method(function: Any, owner: object) -> Any:
     return None if record is None else _bound(frozen(function), (record,), {})
 
 
-def _bound(function: Any, first: tuple[Any, ...], named: dict[str, Any]) -> Callable[..., Any]:
+def _bound(function: object, first: tuple[Any, ...], named: dict[str, Any]) -> Callable[..., Any]:
     """Return ``f(t, x, u, params)`` of a function some of whose arguments are given."""
     given = {f"given{i}": value for i, value in enumerate(first)}
     given |= {f"given_{name}": value for name, value in named.items()}

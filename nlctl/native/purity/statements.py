@@ -6,7 +6,7 @@ import ast
 import contextlib
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -170,7 +170,7 @@ class CallWalker(Expressions):
     def visit_While(self, node: ast.While) -> None:
         self.repeated(node, lambda: self.condition(node.test))
 
-    def repeated(self, node: ast.For | ast.While, begin: Any) -> None:
+    def repeated(self, node: ast.For | ast.While, begin: Callable[..., Any]) -> None:
         """Walk a loop until nothing new is learnt."""
         while True:
             before = dict(self.frame.names)

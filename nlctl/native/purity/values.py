@@ -158,7 +158,7 @@ class KnownValue:
         return self.own, self.inside, self.holds, _marks(self.known)
 
 
-def _marks(known: Any) -> Any:
+def _marks(known: object) -> Any:
     """Return what distinguishes one object that is known from another."""
     if isinstance(known, OneOf | ListOf):
         return type(known).__name__, frozenset(choice.marks for choice in known.choices)

@@ -30,7 +30,7 @@ class Shaken(np.ndarray):
     drawn: np.random.Generator | None  # where the directions are from; None for no change
 
     @classmethod
-    def of(cls, values: Any, drawn: np.random.Generator | None) -> Shaken:
+    def of(cls, values: object, drawn: np.random.Generator | None) -> Shaken:
         """Return values as such an array."""
         shaken = np.array(values, dtype=float).view(cls)
         shaken.drawn = drawn
@@ -55,7 +55,9 @@ class Shaken(np.ndarray):
         np.copyto(out[0].view(np.ndarray), np.asarray(shaken))
         return out[0]
 
-    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+    def __array_function__(
+        self, function: Callable[..., Any], types: object, args: Any, kwargs: Any
+    ) -> Any:
         return self._rounded(function(*_plain(args), **_plain(kwargs)))
 
     def _rounded(self, value: object) -> Any:
@@ -69,21 +71,21 @@ class Shaken(np.ndarray):
         ways = self.drawn.choice((-1.0, 1.0), size=np.shape(value))
         return self._like(value * (1.0 + unit() * ways))
 
-    def _like(self, values: Any) -> Any:
+    def _like(self, values: object) -> Any:
         if not (isinstance(values, np.ndarray | np.floating) and values.dtype == float):
             return values
         return Shaken.of(values, self.drawn)
 
 
-def _plain(given: Any) -> Any:
+def _plain(argument: Any) -> Any:
     """Return arguments with plain arrays in them."""
-    if isinstance(given, Shaken):
-        return given.view(np.ndarray)[()] if given.ndim == 0 else given.view(np.ndarray)
-    if type(given) in (tuple, list):
-        return type(given)(map(_plain, given))
-    if type(given) is dict:
-        return {name: _plain(value) for name, value in given.items()}
-    return given
+    if isinstance(argument, Shaken):
+        return argument.view(np.ndarray)[()] if argument.ndim == 0 else argument.view(np.ndarray)
+    if type(argument) in (tuple, list):
+        return type(argument)(map(_plain, argument))
+    if type(argument) is dict:
+        return {name: _plain(value) for name, value in argument.items()}
+    return argument
 
 
 ROUNDINGS = 24  # ways of rounding that are tried; the first is none

@@ -62,21 +62,23 @@ def sliding_rates(
     rates = [_rate(graph, relay, motion) for relay in relays]
     leaves = [relay.leaf for relay in relays]
     read = [set(leaves).intersection(needed([rate.whole])) for rate in rates]
-    made: dict[int, SlidingRate] = {}
-    while len(made) < len(relays):
-        known = {leaves[i]: one.output for i, one in made.items()}
-        ready = [i for i in range(len(relays)) if i not in made and read[i] <= {leaves[i], *known}]
+    solved: dict[int, SlidingRate] = {}
+    while len(solved) < len(relays):
+        outputs = {leaves[i]: one.output for i, one in solved.items()}
+        ready = [
+            i for i in range(len(relays)) if i not in solved and read[i] <= {leaves[i], *outputs}
+        ]
         if not ready:
-            names = ", ".join(f"'{r.name}'" for i, r in enumerate(relays) if i not in made)
+            names = ", ".join(f"'{r.name}'" for i, r in enumerate(relays) if i not in solved)
             raise CompileError(
                 f"the ideal relays {names} act on the rates of each other's inputs: what slides "
                 f"where both inputs are 0 has no one answer; of one {_SMOOTH}"
             )
         for i in ready:
-            drift, gain, *here = replaced_parts(graph, [*rates[i].line, *rates[i].piece], known)
+            drift, gain, *here = replaced_parts(graph, [*rates[i].line, *rates[i].piece], outputs)
             v = output(i, (relays[i].given, here[0], here[1]))
-            made[i] = SlidingRate(drift=drift, gain=gain, output=v)
-    return [made[i] for i in range(len(relays))]
+            solved[i] = SlidingRate(drift=drift, gain=gain, output=v)
+    return [solved[i] for i in range(len(relays))]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -159,7 +160,7 @@ class HeldRun(SteppedRun):
             first = max(end - 1, 0)
             self.window.run.task.inputs[:, first : end + 1] = self.inputs[:, None]
 
-    def compared(self, _: np.ndarray, params: Any, audit: Audit) -> None:
+    def compared(self, _: np.ndarray, params: Mapping[str, Any] | None, audit: Audit) -> None:
         """Compare the program with python-control at both ends of the step that was made."""
         i = self.window.place(self.k - 1)
         task, work = self.window.run.task, self.window.run.work

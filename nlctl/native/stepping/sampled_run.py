@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -79,7 +80,7 @@ class SampledRun(SteppedRun):
         """Stand where the run once stood."""
         self.k, self.states = kept
 
-    def compared(self, x0: np.ndarray, params: Any, audit: Audit) -> None:
+    def compared(self, x0: np.ndarray, params: Mapping[str, Any] | None, audit: Audit) -> None:
         """Compare the program with python-control at both ends of the step that was made."""
         u = np.repeat(self.inputs[:, None], 2, axis=1)
         trial = Trial(

@@ -220,16 +220,20 @@ class Stepper:
             If the inputs have another shape.
         """
         count = self.compiled.system.ninputs or 0
-        given = as_numbers(inputs)
-        given = given[None, :] if given is not None and given.ndim == 1 and count == 1 else given
-        if given is None or given.ndim != 2 or given.shape[0] != count:
+        columns = as_numbers(inputs)
+        columns = (
+            columns[None, :]
+            if columns is not None and columns.ndim == 1 and count == 1
+            else columns
+        )
+        if columns is None or columns.ndim != 2 or columns.shape[0] != count:
             raise ParameterError(
                 f"rollout needs inputs of shape ({count}, m), one column a step, got "
-                f"{'no numbers' if given is None else given.shape}"
+                f"{'no numbers' if columns is None else columns.shape}"
             )
         here = self.snapshot()
-        rows = np.full((self.compiled.system.noutputs or 0, given.shape[1]), np.nan)
-        for k, u in enumerate(np.ascontiguousarray(given.T, dtype=float)):
+        rows = np.full((self.compiled.system.noutputs or 0, columns.shape[1]), np.nan)
+        for k, u in enumerate(np.ascontiguousarray(columns.T, dtype=float)):
             outputs = None if self._failed is not None else self.run.advance(u)
             if outputs is None:
                 break
@@ -283,7 +287,7 @@ class Stepper:
             + ("" if self._failed is None else f"; {self._failed}")
         )
 
-    def _inputs(self, inputs: Any) -> np.ndarray:
+    def _inputs(self, inputs: object) -> np.ndarray:
         """Return the inputs of a step, shape (ninputs,)."""
         count = self.compiled.system.ninputs or 0
         given = as_numbers(inputs)
@@ -304,7 +308,11 @@ class Stepper:
 
 
 def begun(
-    one: Stepper, start: tuple[np.ndarray, np.ndarray], params: Any, time: float, u: np.ndarray
+    one: Stepper,
+    start: tuple[np.ndarray, np.ndarray],
+    params: Mapping[str, Any] | None,
+    time: float,
+    u: np.ndarray,
 ) -> np.ndarray:
     """Begin again with a state and a vector of parameters; return the outputs with inputs `u`."""
     one.run.begin(*start, number("reset", "time", time))
@@ -335,7 +343,7 @@ def stepper(
     max_step: float | None = None,
     step: float | None = None,
     ignore_errors: bool = False,
-    audit: Any = True,
+    audit: object = True,
 ) -> Stepper:
     """Make of a diagram what can be simulated step by step, with inputs chosen on the way.
 

@@ -188,7 +188,7 @@ class VectorStepper:
         ]  # fmt: skip
         return np.array(numbers, dtype=int)
 
-    def _begins(self, initial_state: Any, params: Any) -> tuple[np.ndarray, np.ndarray, Any]:
+    def _begins(self, initial_state: object, params: object) -> tuple[np.ndarray, np.ndarray, Any]:
         """Return states and parameter vectors by columns, and what gives the parameters of one."""
         every = members(self.compiled, checked_params(params) or {}, initial_state)
         if every.size not in (1, self.size):
@@ -199,37 +199,37 @@ class VectorStepper:
         x0, p = every.batch(range(every.size), self.size)
         return x0, p, lambda i: every.given(min(i, every.size - 1)) or None
 
-    def _chosen(self, members: Any) -> np.ndarray:
+    def _chosen(self, members: object) -> np.ndarray:
         """Return the numbers of the runs that begin again."""
         if members is None:
             return np.arange(self.size)
-        given = np.atleast_1d(np.asarray(members))
-        if given.dtype == bool and given.shape == (self.size,):
-            return np.flatnonzero(given)
-        if not given.size:
+        numbers = np.atleast_1d(np.asarray(members))
+        if numbers.dtype == bool and numbers.shape == (self.size,):
+            return np.flatnonzero(numbers)
+        if not numbers.size:
             return np.zeros(0, dtype=int)
-        whole = given.dtype.kind in "iu" and given.ndim == 1
-        if whole and given.min() >= 0 and given.max() < self.size:
-            return np.unique(given)
+        whole = numbers.dtype.kind in "iu" and numbers.ndim == 1
+        if whole and numbers.min() >= 0 and numbers.max() < self.size:
+            return np.unique(numbers)
         raise ParameterError(
             f"reset needs members to be numbers from 0 to {self.size - 1}, or {self.size} of True "
             f"and False, got {members!r}"
         )
 
-    def _inputs(self, who: str, inputs: Any) -> np.ndarray:
+    def _inputs(self, who: str, inputs: object) -> np.ndarray:
         """Return inputs of shape (size, ninputs)."""
         count = self.compiled.system.ninputs or 0
-        given = as_numbers(inputs)
-        if given is not None and count == 1 and given.shape == (self.size,):
-            given = given[:, None]
-        if given is None or given.shape not in ((), (count,), (self.size, count)):
-            shape = "no numbers" if given is None else f"shape {given.shape}"
+        rows = as_numbers(inputs)
+        if rows is not None and count == 1 and rows.shape == (self.size,):
+            rows = rows[:, None]
+        if rows is None or rows.shape not in ((), (count,), (self.size, count)):
+            shape = "no numbers" if rows is None else f"shape {rows.shape}"
             names = ", ".join(self.compiled.system.input_labels)
             raise ParameterError(
                 f"{who} needs inputs of shape ({self.size}, {count}), members by inputs ({names}), "
                 f"or one row for all, got {shape}"
             )
-        return np.array(np.broadcast_to(given, (self.size, count)))
+        return np.array(np.broadcast_to(rows, (self.size, count)))
 
 
 @as_annotated
@@ -245,7 +245,7 @@ def vector_stepper(
     max_steps: int | None = None,
     max_step: float | None = None,
     step: float | None = None,
-    audit: Any = True,
+    audit: object = True,
 ) -> VectorStepper:
     """Make of a diagram many runs that are simulated together, step by step.
 

@@ -166,7 +166,7 @@ _SHOWN = {  # what a step fills and nothing reads later
 }
 
 
-def in_one_piece(work: Any, memory: np.ndarray | None = None) -> tuple[Any, np.ndarray]:
+def in_one_piece(work: object, memory: np.ndarray | None = None) -> tuple[Any, np.ndarray]:
     """Return a workspace with its arrays in one piece of memory, this or a new one, and that."""
     places, size = _places(work)
     if memory is None:
@@ -181,12 +181,12 @@ def in_one_piece(work: Any, memory: np.ndarray | None = None) -> tuple[Any, np.n
     return _with_arrays(work, views), memory
 
 
-def memory_size(work: Any) -> int:
+def memory_size(work: object) -> int:
     """Return how many bytes a workspace takes in one piece."""
     return _places(work)[1]
 
 
-def _places(work: Any) -> tuple[dict[int, int], int]:
+def _places(work: object) -> tuple[dict[int, int], int]:
     """Return where arrays begin in one piece of memory, by their addresses now, and its size."""
     places: dict[int, int] = {}  # arrays that are the same memory stay so
     size = 0
@@ -197,12 +197,12 @@ def _places(work: Any) -> tuple[dict[int, int], int]:
     return places, size
 
 
-def _kept_arrays(work: Any) -> dict[tuple[str, ...], np.ndarray]:
+def _kept_arrays(work: object) -> dict[tuple[str, ...], np.ndarray]:
     """Return the arrays of a workspace that a run reads again, by their names."""
     return {path: a for path, a in named_arrays(work) if a.size and path not in _SHOWN}
 
 
-def _with_arrays(record: Any, views: dict[tuple[str, ...], np.ndarray]) -> Any:
+def _with_arrays(record: object, views: dict[tuple[str, ...], np.ndarray]) -> Any:
     """Return a record with other arrays."""
     whole = {path[0]: view for path, view in views.items() if len(path) == 1}
     for name in {path[0] for path in views if len(path) > 1}:

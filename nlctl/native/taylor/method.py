@@ -9,6 +9,7 @@ import numpy as np
 
 from ..integrate.memory import with_fields, with_table
 from ..integrate.methods.taylor import TaylorMethod
+from ..integrate.workspace import Task
 from ..machine.routine import entries_of
 from ..reading import Reading
 from ..settings import Settings
@@ -33,7 +34,7 @@ def order_for(rtol: float) -> int:
 
 
 def with_taylor(
-    task: Any, reading: Reading, p: np.ndarray, settings: Settings
+    task: Task, reading: Reading, p: np.ndarray, settings: Settings
 ) -> tuple[Any, tuple[int, int]]:
     """Return the task with Taylor's method, and the shape of the coefficients."""
     order, coefficients = order_for(settings.rtol), series(reading, p, p.shape[1])

@@ -66,16 +66,20 @@ def ahead(
 
 def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
     """Return it for one parameter vector, from what is known of the program already."""
-    known, key, found = timed.known, (span, p[timed.parameters].tobytes()), timed.conditions
-    if key not in known:
-        if len(known) >= _KEPT:
-            known.clear()
-        fastest = _fastest(found.waves, p)
-        pulses = reach(found.pulses, p, span) if found.pulses else np.zeros(0)
-        breaks = break_points(found.of_time, p, span, fastest) if found.of_time else np.zeros(0)
+    cache, key, conditions = timed.known, (span, p[timed.parameters].tobytes()), timed.conditions
+    if key not in cache:
+        if len(cache) >= _KEPT:
+            cache.clear()
+        fastest = _fastest(conditions.waves, p)
+        pulses = reach(conditions.pulses, p, span) if conditions.pulses else np.zeros(0)
+        breaks = (
+            break_points(conditions.of_time, p, span, fastest)
+            if conditions.of_time
+            else np.zeros(0)
+        )
         longest = np.pi / fastest if fastest else np.inf
-        known[key] = Ahead(breaks=breaks, longest=longest, reach=pulses)
-    return known[key]
+        cache[key] = Ahead(breaks=breaks, longest=longest, reach=pulses)
+    return cache[key]
 
 
 def _fastest(waves: tuple[tuple[Expr, ...], ...], p: np.ndarray) -> float:

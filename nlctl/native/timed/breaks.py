@@ -32,28 +32,28 @@ def break_points(
     """Return when conditions of t alone switch within a run with one parameter vector."""
 
     def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
-        found = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
-        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in found]
+        instants = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
+        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in instants]
 
     def constant(expr: Expr) -> np.ndarray:
-        (found,) = evaluate_expressions([expr], {"p": p[:, None]})
-        return np.squeeze(found)
+        (instants,) = evaluate_expressions([expr], {"p": p[:, None]})
+        return np.squeeze(instants)
 
     args = [arg for c in conditions for arg in c.args if arg.size is None]
     lines = as_lines(args, constant, span)
     found, doubt = [np.zeros(0)], _DOUBTFUL * max(map(abs, span))
     for condition in conditions:
-        places, elements = _known(condition, lines), range(condition.size or 1)
+        crossed, elements = _known(condition, lines), range(condition.size or 1)
         indicators: list[Indicator] = [partial(_level, condition, values, k) for k in elements]
-        if places is None:
-            places = levels_met(condition, lines, constant)
-            if places is not None:  # how many elements hold
+        if crossed is None:
+            crossed = levels_met(condition, lines, constant)
+            if crossed is not None:  # how many elements hold
                 indicators = [lambda t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
-            if places is None:
+            if crossed is None:
                 switched = _sought(indicator, span, fastest)
             else:
-                switched = _exact(indicator, places, span)
+                switched = _exact(indicator, crossed, span)
             switched = switched[(switched > span[0]) & (switched <= span[1])]
             found += [switched - doubt, switched + doubt] if _is_computed(condition) else [switched]
     every = np.unique(np.concatenate(found))

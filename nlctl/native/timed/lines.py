@@ -183,7 +183,7 @@ def _piecewise(node: Expr, args: list[Lines]) -> Lines:
     return _ON_PIECES[node.op](node.op, parts, middle, 0.5 * length)
 
 
-def _constant(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) -> Lines:
+def _constant(op: str, parts: list[Lines], middle: list[np.ndarray], half: object) -> Lines:
     """Return what is constant on each piece."""
     with np.errstate(all="ignore"):
         values = np.asarray(numpy_function(op)(*middle), dtype=float)
@@ -203,7 +203,7 @@ def _chosen(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) ->
     return replace(a, values=values, slopes=slopes)
 
 
-def _rest(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) -> Lines:
+def _rest(op: str, parts: list[Lines], middle: list[np.ndarray], half: object) -> Lines:
     """Return the remainder of a line by a constant: the same slope, another level."""
     if np.any(parts[1].slopes):
         raise NotLines

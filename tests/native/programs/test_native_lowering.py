@@ -31,7 +31,7 @@ def evaluated(system, lanes, t, x, u, params=None, *, native=False, given=None):
     compiled = compile_diagram(system, params=given)
     lowered = lower(compiled.schedule, compiled.program, lanes)
     p = np.array([compiled.parameter_vector(own) for own in params or [given] * lanes]).T.copy()
-    prepare, rhs, out = lowered_code(lowered) if native else plain_functions(lowered)
+    prepare, rhs, out, *_ = lowered_code(lowered) if native else plain_functions(lowered)
     c = np.full((lowered.size, lanes), np.nan)
     rows = {**lowered.rows, "y": system.noutputs or 0}
     dx, g, m, y = (np.full((rows[name], lanes), np.nan) for name in ("dx", "g", "m", "y"))
@@ -272,7 +272,7 @@ def test_algebraic_loops_are_solved_for_each_member():
     u = np.array([[0.3, -1.2]])
     compiled = compile_diagram(loop, algebraic_loops="solve")
     lowered = lower(compiled.schedule, compiled.program, 2)
-    prepare, _, out = plain_functions(lowered)
+    prepare, _, out, *_ = plain_functions(lowered)
     c, y = np.empty((lowered.size, 2)), np.empty((1, 2))
     prepare(np.repeat(compiled.parameter_vector()[:, None], 2, axis=1), c)
     out(np.zeros(2), np.empty((0, 2)), u, c, y)

@@ -6,15 +6,14 @@ What is given lies in front of what results, as for every call; rows lie one beh
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from .text import Value
+from .text import Body, Value
 
 
 class _Memory:
     """Numbers in memory, and integers; `b` writes IR or C."""
 
-    def __init__(self, b: Any, step: int) -> None:
+    def __init__(self, b: Body, step: int) -> None:
         self.b, self.step = b, step
         self.zero, self.one = self.whole(0), self.whole(1)
 
@@ -30,7 +29,7 @@ class _Memory:
         assert total is not None
         return self.b.address("a", 0, total.text, self.step)
 
-    def load(self, *terms: Any) -> Value:
+    def load(self, *terms: Value | tuple[Value, Value]) -> Value:
         return self.b.load(self.at(*terms), 0)
 
     def less(self, where: str, factor: Value, other: Value) -> None:
@@ -38,7 +37,7 @@ class _Memory:
         self.b.store(self.b.sub(self.b.load(where, 0), self.b.mul(factor, other)), where)
 
 
-def factorised(b: Any, step: int, n: Value) -> None:
+def factorised(b: Body, step: int, n: Value) -> None:
     """Write the factors of an n x n matrix: each column's first largest entry comes up."""
     m = _Memory(b, step)
     begin = b.logic("mul", n, n)
@@ -90,7 +89,7 @@ def factorised(b: Any, step: int, n: Value) -> None:
     b.counted(m.zero, n, column)
 
 
-def back_substituted(b: Any, step: int, n: Value, columns: Value) -> None:
+def back_substituted(b: Body, step: int, n: Value, columns: Value) -> None:
     """Write the solution for some right-hand sides, from the factors in front of them."""
     m = _Memory(b, step)
     order = b.logic("mul", n, n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Collection
 from typing import Any
 
 from ....expressions.graph import COMPARISONS, LINEAR, LOGIC, Expr
@@ -20,7 +21,7 @@ PACKED = 4  # numbers of one member whose sines, powers, ... are computed togeth
 class Writer:
     """Writes one function; `names` says what each expression is called so far."""
 
-    def __init__(self, b: Body, plan: FunctionPlan, lanes: int, exact: Any) -> None:
+    def __init__(self, b: Body, plan: FunctionPlan, lanes: int, exact: Collection[Expr]) -> None:
         # `lanes` members, and operations that are `exact`: rounded one by one
         self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
         self.width = 0 if lanes == 1 else lanes
@@ -155,7 +156,7 @@ class Writer:
             self.names[node] = b.element(values[node.op], angles.index(node.args[0]))
 
 
-def _depths(nodes: tuple[Expr, ...], is_packable: Any) -> dict[Expr, int]:
+def _depths(nodes: tuple[Expr, ...], is_packable: Callable[..., Any]) -> dict[Expr, int]:
     """Return how many functions stand one behind the other before each number of a level."""
     depth: dict[Expr, int] = {}
     for node in nodes:
