@@ -148,7 +148,9 @@ class PassWriter(ast.NodeTransformer):
         if assigned is None:
             return None
         assigned = [n for n in assigned if n not in self.passing]
-        names = ast.Constant(tuple(assigned)), ast.Constant(tuple(written))
+        names = (
+            ast.Tuple([ast.Constant(n) for n in part], ast.Load()) for part in (assigned, written)
+        )
         begin = ast.Expr(_method(name, "begins", *names))
         if not assigned:
             return [begin, *body, ast.Expr(_method(name, "chosen"))]

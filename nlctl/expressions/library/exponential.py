@@ -50,6 +50,6 @@ def expm(graph: Graph, a: Any) -> Tracer:
 def _of_powers(powers: list[Tracer], factors: list[float]) -> Tracer:
     """Return the polynomial in the square, of which the powers up to the third are there."""
     low, high = factors[:4], factors[4:]
-    upper = sum(f * p for f, p in zip(high, powers[1:], strict=False))
-    lower = sum(f * p for f, p in zip(low, powers, strict=False))
+    upper: Any = sum(f * p for f, p in zip(high, powers[1:], strict=False))
+    lower: Any = sum(f * p for f, p in zip(low, powers, strict=False))
     return lower + product(powers[3], upper)
