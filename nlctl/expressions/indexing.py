@@ -22,7 +22,7 @@ def _item(self: Tracer, key: Any) -> Any:
     key = _settled(key)
     if isinstance(key, str) and key in self.labels:
         return self.item_at(self.labels[key])
-    if _is_mask(key):
+    if isinstance(key, Tracer) and _is_mask(key):
         return Masked(self, key)
     if isinstance(key, Tracer) and key.shape:
         items = [_item(self, k) for k in key.short().reshape(-1)]

@@ -190,9 +190,9 @@ def captured(thing: object) -> KnownValue:
         return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
         return KnownValue(False, thing.ndim <= 1, known=thing)
-    parts = thing.values() if isinstance(thing, dict) else thing
-    held = isinstance(thing, tuple | list | dict | set | frozenset)
-    numbers = held and all(isinstance(v, PLAIN) for v in parts)
+    numbers = isinstance(thing, tuple | list | dict | set | frozenset) and all(
+        isinstance(v, PLAIN) for v in (thing.values() if isinstance(thing, dict) else thing)
+    )
     return KnownValue(False, numbers, True, known=thing)
 
 
