@@ -165,6 +165,7 @@ class Graph:
         # what is computed in passes of loops that may have ended, a set for each such loop
         self.passing: list[set[Expr]] = []
         self.of_passes: set[Expr] = set()  # what only later passes of such loops compute
+        self.is_cut = False  # whether Python may take more passes of a loop than are written out
         self._known: dict[Any, Expr] = {}
         self._results: dict[tuple[Any, ...], Expr] = {}
 

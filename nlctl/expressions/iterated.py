@@ -2,8 +2,8 @@
 
 Each pass is written out, and what it assigns is chosen: the new value where the loop still runs,
 otherwise what there was.  Python ends each such loop; where more passes than `_MOST` would be
-needed, the result is NaN.  Where a pass ends the values hardly differ, so that what only later
-passes ask for is not located.
+needed, the result is NaN, and a run that ends there is refused.  Where a pass ends the values
+hardly differ, so that what only later passes ask for is not located.
 """
 
 from __future__ import annotations
@@ -341,6 +341,7 @@ class Loop:
             self.graph.passing.pop()
         self.graph.of_passes |= self.later - self.first
         if self.passes > _MOST and self.running.op != "const":
+            self.graph.is_cut = True
             self.fails()
 
     def fails(self) -> None:

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from ..delays.variation import Variation
-from ..errors import ParameterError
+from ..errors import CompileError, ParameterError
 from .along import derivatives
 from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from .compiled import Compiled
@@ -84,9 +84,21 @@ def trajectory(
         outputs = finish(run)
     reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
     reached = at_its_end(run, reached)
+    refuse_cut_loops(compiled, reached.statistics, bool(compiled.equations.graph.of_passes))
     if run.spare is not None:
         give_back(compiled.cache, run.spare)
     return reached
+
+
+def refuse_cut_loops(compiled: Compiled, reached: Statistics, is_cut: bool) -> None:
+    """Refuse a run that may have ended where a loop takes more passes than are written out."""
+    if is_cut and reached.status in (Status.DIVERGED, Status.STEP_TOO_SMALL):
+        raise CompileError(
+            f"'{compiled.system.name}' has a function with a loop that ends at a tolerance, and "
+            f"may take more passes near t = {reached.time:.6g} s than are written out in machine "
+            "code: bound them, as for _ in range(50) with a break does, or run it by "
+            "engine='python-control'"
+        )
 
 
 def _sampled(course: Course, x0: np.ndarray, p: np.ndarray) -> Trajectory:

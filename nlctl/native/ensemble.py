@@ -36,7 +36,7 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
-from .driver import Course, begin, finish, prepared, trajectory, watched
+from .driver import Course, begin, finish, prepared, refuse_cut_loops, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike, SignalsByName
 from .happened import happened
 from .integrate.methods.tableau import Tableau
@@ -294,7 +294,9 @@ def _group(every: Members, numbers: range, course: Course, stop: Event) -> Itera
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
             yield trajectory(course, x0[:, j], p[:, j])
         else:
-            yield replace(made(run, outputs, j), happened=happened(compiled, run, j))
+            member = replace(made(run, outputs, j), happened=happened(compiled, run, j))
+            refuse_cut_loops(compiled, member.statistics, compiled.equations.graph.is_cut)
+            yield member
 
 
 def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Run, np.ndarray]:
