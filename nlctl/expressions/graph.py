@@ -47,7 +47,7 @@ class Ambiguous(Exception):  # noqa: N818 (it ends a trace: the block is refused
     """A function does what means one thing in Python and another in machine code."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Expr:
     """One expression."""
 
@@ -68,6 +68,13 @@ class Expr:
     # of an integer: what it is for the parameter values of the trace; None if it depends on
     # more than parameters
     value: int | None
+
+    def __repr__(self) -> str:  # parts by their places: most are parts of many
+        inside = [
+            *(f"e{arg.index}" for arg in self.args),
+            *([] if self.data is None else [self.data]),
+        ]
+        return f"e{self.index} = {self.op}({', '.join(map(str, inside))})"
 
 
 def numpy_function(op: str) -> Any:
