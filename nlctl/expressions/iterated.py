@@ -226,8 +226,8 @@ def _assigned(body: Sequence[ast.stmt]) -> tuple[list[str] | None, list[str]]:
     inner = (s for s in _statements(body))
     if any(isinstance(s, ast.Return | ast.Break | ast.Raise) for s in inner):
         return None, []
-    own = {g.target.id for s in body for n in ast.walk(s) for g in getattr(n, "generators", ())
-           if isinstance(g.target, ast.Name)}  # fmt: skip
+    local = {g.target.id for s in body for n in ast.walk(s) for g in getattr(n, "generators", ())
+             if isinstance(g.target, ast.Name)}  # fmt: skip
     for part in (n for s in body for n in ast.walk(s)):
         if isinstance(part, _ALWAYS_NEW):
             return None, []
@@ -236,7 +236,7 @@ def _assigned(body: Sequence[ast.stmt]) -> tuple[list[str] | None, list[str]]:
             return None, []
         if isinstance(part, ast.Attribute) and isinstance(part.ctx, ast.Store):
             return None, []
-        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store) and part.id not in own:
+        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store) and part.id not in local:
             names[part.id] = None
         target = part.target if isinstance(part, ast.AugAssign) else part
         while isinstance(target, ast.Subscript) and isinstance(part, ast.AugAssign | ast.Subscript):
@@ -428,7 +428,7 @@ def _copied(value: Any) -> Any:
 
 
 def _content(value: Any, depth: int = 3) -> Any:
-    """Return what tells whether a value has been written into."""
+    """Return something that is another when a value has been written into."""
     if isinstance(value, Tracer):
         return tuple(map(id, value.elements().flat)) if value.shape else id(value.only)
     if not depth or isinstance(value, Loop | type):

@@ -2,8 +2,8 @@
 
 exp(-(x / w)^2), tanh(x / w), 1 / (1 + (x / w)^2) and high powers are constants, to rounding, but
 for the few w around 0.  What a step that begins and ends there sees of them says nothing of what
-lies in between, whether they are rates or what a condition compares.  A number tells: where it
-moves by 1 the function moves by a factor e at most, and farther than `RANGE` from 0 it is flat.
+lies in between, whether they are rates or what a condition compares.  One number measures it: where
+it moves by 1 the function moves by a factor e at most, and farther than `RANGE` from 0 it is flat.
 """
 
 from __future__ import annotations

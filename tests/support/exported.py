@@ -24,6 +24,8 @@ def halved(t, x, u, params):
     y = u[0]
     while abs(y) > 1.0:
         y = 0.5 * y
+        if y == 0.5:
+            continue  # a pass with one is not written out
     return [y]
 
 

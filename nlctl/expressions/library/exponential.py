@@ -30,7 +30,7 @@ def expm(graph: Graph, a: Any) -> Tracer:
     """Return e^A; NaN where its norm is so large that SciPy would square more often."""
     matrix = traced(graph, a)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise Untraceable("the exponential of what is no square matrix")
+        raise Untraceable("the exponential of a matrix that is not square")
     if matrix.shape[0] > _ROWS:
         raise Untraceable(f"the exponential of a matrix of more than {_ROWS} rows")
     np_, one = Facade(graph), traced(graph, np.eye(matrix.shape[0]))

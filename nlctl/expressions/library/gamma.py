@@ -25,7 +25,7 @@ def loggamma_of_size(np: Facade, x: Any) -> Any:
 
 
 def gamma(np: Facade, x: Any) -> Any:
-    """The gamma function: (x - 1)! of whole numbers."""
+    """The gamma function: (x - 1)! of integers."""
     left = x < 0.5
     z = np.where(left, 1.0 - x, x)
     value = np.exp(_stirling(np, z)) / _product(z)
@@ -33,7 +33,7 @@ def gamma(np: Facade, x: Any) -> Any:
 
 
 def _sine(np: Facade, x: Any) -> Any:
-    """sin(pi x), 0 at whole numbers."""
+    """sin(pi x), 0 at integers."""
     nearest = np.rint(x)
     half = 0.5 * nearest
     odd = half - np.floor(half)

@@ -65,9 +65,9 @@ def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
     width, first, last = right - left, f(left, *args), f(right, *args)
     if first * last > 0:
         raise ValueError("f(a) and f(b) must have different signs")
-    found, root = (first == 0) | (last == 0), np.where(first == 0, left, right)
+    is_root, root = (first == 0) | (last == 0), np.where(first == 0, left, right)
     for _ in range(maxiter):
-        if found:
+        if is_root:
             return root
         width = 0.5 * width
         root = left + width

@@ -94,7 +94,7 @@ def equations(
             sizes_of_guarded = [n.size if count_guards(n) else 0 for n in reader.blocks]
             results["reset"] = list(_in_rows(sizes_of_guarded, reader.resets).values())
         if switches.sharp:
-            results["sharp"] = _rows_of(graph, (each.expr for each in switches.sharp))
+            results["sharp"] = _rows_of(graph, (argument.expr for argument in switches.sharp))
         results = reader.all_known(results)
         for k, what in enumerate(meetings):
             at_instant = during(schedule, what)
@@ -137,7 +137,7 @@ def _conditions(
 def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     """Return the switching functions of conditions with their rows, behind those declared."""
     row = sum(count_switching_functions(node) for node in reader.blocks)
-    return _rows_of(reader.graph, (each.function for each in switches.located), row)
+    return _rows_of(reader.graph, (one.function for one in switches.located), row)
 
 
 def _rows_of(graph: Graph, exprs: Iterable[Expr], row: int = 0) -> list[tuple[int, Tracer]]:

@@ -73,7 +73,7 @@ class Conditions:
     @property
     def kinds(self) -> list[int]:
         """How each of the numbers is by which sharp functions are measured."""
-        return [each.kind for each in self.sharp for _ in range(each.expr.size or 1)]
+        return [one.kind for one in self.sharp for _ in range(one.expr.size or 1)]
 
     @property
     def count(self) -> int:

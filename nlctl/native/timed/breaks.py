@@ -15,11 +15,6 @@ _GRID = 8192  # places at which a condition is looked at that is not made of lin
 _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
-# Of the times: on either side of a switch nothing is evaluated that is as close.  Machine code
-# contracts products and sums, and may switch some last digits earlier or later than values here; a
-# memory that has seen the other side too early, or too late, goes the wrong way for good.
-# Integrators pass break points that are 1e-14 of the times apart at once.
-_DOUBTFUL = 4e-15
 
 Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 # of times: one integer between two switches and another one behind
@@ -32,16 +27,16 @@ def break_points(
     """Return when conditions of t alone switch within a run with one parameter vector."""
 
     def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
-        instants = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
-        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in instants]
+        numbers = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
+        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in numbers]
 
     def constant(expr: Expr) -> np.ndarray:
-        (instants,) = evaluate_expressions([expr], {"p": p[:, None]})
-        return np.squeeze(instants)
+        (number,) = evaluate_expressions([expr], {"p": p[:, None]})
+        return np.squeeze(number)
 
     args = [arg for c in conditions for arg in c.args if arg.size is None]
     lines = as_lines(args, constant, span)
-    found, doubt = [np.zeros(0)], _DOUBTFUL * max(map(abs, span))
+    instants = [np.zeros(0)]
     for condition in conditions:
         crossed, elements = _known(condition, lines), range(condition.size or 1)
         indicators: list[Indicator] = [partial(_level, condition, values, k) for k in elements]
@@ -51,18 +46,11 @@ def break_points(
                 indicators = [lambda t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
             if crossed is None:
-                switched = _sought(indicator, span, fastest)
+                instants.append(_sought(indicator, span, fastest))
             else:
-                switched = _exact(indicator, crossed, span)
-            switched = switched[(switched > span[0]) & (switched <= span[1])]
-            found += [switched - doubt, switched + doubt] if _is_computed(condition) else [switched]
-    every = np.unique(np.concatenate(found))
+                instants.append(_exact(indicator, crossed, span))
+    every = np.unique(np.concatenate(instants))
     return every[(every > span[0]) & (every <= span[1])]
-
-
-def _is_computed(condition: Expr) -> bool:
-    """Return whether rounding has a say in when a condition switches: unless t is compared."""
-    return any(arg.varies and arg.op != "leaf" for arg in condition.args)
 
 
 def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:

@@ -307,6 +307,8 @@ def reads(t, x, u, params):
     total = params["k"] * x[0]
     while total > 1e3:
         total *= 0.5
+        if total > 1e9:
+            continue  # a pass with one is not written out
     total += params.get("absent", 0.5) + params.get("k") + params["rows"][1]
     if "get" in params and "other" not in params:
         total += params["get"]
