@@ -63,12 +63,18 @@ def _around(size, k):
 
 
 @equation
-def _differences(t, y):
-    """Return the divided differences of a piece: f[t_i, ..., t_(i + m)] is `table[i, m]`."""
-    # As many as curves have coefficients that go through samples of a piece of five or more.
-    table = np.empty((t.size, min(2 * _HALF + 1, max(t.size - 2, 4))))
+def _coefficients(size):
+    """Return how many coefficients curves through samples of a piece of five or more have."""
+    return min(2 * _HALF + 1, max(size - 2, 4))
+
+
+@equation
+def _differences(t, y, count):
+    """Return divided differences: f[t_i, ..., t_(i + m)], m < count, is `table[i, m]`."""
+    # A row has the coefficients of Newton's form of the polynomial through a sample and the next.
+    table = np.empty((t.size, count))
     table[:, 0] = y
-    for m in range(1, table.shape[1]):
+    for m in range(1, count):
         for i in range(t.size - m):
             table[i, m] = (table[i + 1, m - 1] - table[i, m - 1]) / (t[i + m] - t[i])
     return table
@@ -101,16 +107,6 @@ def _doubt(t, y, table, k):
 
 
 @equation
-def _coefficients(s, y):
-    """Return the coefficients of Newton's form of the polynomial through all points."""
-    c = y.copy()
-    for m in range(1, c.size):
-        for j in range(c.size - 1, m - 1, -1):
-            c[j] = (c[j] - c[j - 1]) / (s[j] - s[j - m])
-    return c
-
-
-@equation
 def _at(s, c, x):
     """Return the polynomial in Newton's form with its first and second derivative."""
     p, d, dd = c[-1], 0.0, 0.0
@@ -128,7 +124,7 @@ def _turn(t, y, k, low, high):
     begin, end = _around(t.size, k)
     t, y, k = t[begin:end], y[begin:end], k - begin
     s, x = t - t[k], 0.0
-    table = _differences(s, y - y[k])
+    table = _differences(s, y - y[k], _coefficients(t.size))
     a = _window(table, k)
     c = table[a]
     for _ in range(5):  # Newton's method: quadratic from the sample
@@ -193,10 +189,10 @@ def _extrapolated(t, y, at):
     # it counts less that term, times its ratio to the one before: what the next would be.
     n = min(_NEAREST, t.size)
     if at < t[0]:
-        s, values = t[:n] - at, y[:n].copy()
+        s, values = t[:n] - at, y[:n]
     else:
-        s, values = t[::-1][:n] - at, y[::-1][:n].copy()
-    c = _coefficients(s, values)
+        s, values = t[::-1][:n] - at, y[::-1][:n]
+    c = _differences(s, values, n)[0]
     total, best, least, product = c[0], c[0], np.inf, 1.0
     before, off = np.inf, np.inf
     for m in range(1, n):
@@ -272,7 +268,7 @@ def _divide(t, y, k, table, doubt, times, values):
 @equation
 def _follow(t, y, parts, times, values):
     """Write the curve of a piece as points that lines connect; return how many."""
-    table, n = _differences(t, y), 0
+    table, n = _differences(t, y, _coefficients(t.size)), 0
     doubt = _doubt(t, y, table, 0) if t.size > 4 else 0.0
     for k in range(t.size):
         times[n], values[n], n = t[k], y[k], n + 1

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable
 from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
-from .graph import ORDERS, Expr, Graph, needed, parts_first
+from .graph import ORDERS, Expr, Graph, deduce, needed, parts_first
 from .sharp import as_power
 from .without_poles import as_fraction, compared, multiplied
 
@@ -160,13 +160,14 @@ def _is_product(node: Expr) -> bool:
 def _factors(function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
     factors: dict[Expr, tuple[Expr, ...]] = {}
-    for node in parts_first([function], lambda e: e.args if _is_product(e) else ()):
-        factors[node] = (node,)
-        if _is_product(node):
-            several = [part for arg in node.args if arg.varies for part in factors[arg]]
-            if len(set(several)) == len(several) > 0:
-                factors[node] = tuple(several)
-    return factors[function]
+
+    def of_product(node: Expr) -> tuple[Expr, ...]:
+        if not _is_product(node):
+            return (node,)
+        several = [part for arg in node.args if arg.varies for part in factors[arg]]
+        return tuple(several) if len(set(several)) == len(several) > 0 else (node,)
+
+    return deduce(factors, function, lambda e: e.args if _is_product(e) else (), of_product)
 
 
 def _signed(graph: Graph, number: Expr) -> Expr:

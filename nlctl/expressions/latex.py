@@ -123,8 +123,7 @@ class LatexWriter:
 
     def _held(self, expr: Expr, index: Index | None, depth: int, least: int) -> str:
         """Return a formula, in parentheses where it would fall apart."""
-        text, tightness = self._written(expr, index, depth)
-        return text if tightness >= least else rf"\left({text}\right)"
+        return _held(*self._written(expr, index, depth), least)
 
     def _const(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         text = number_text(float(expr.data))
@@ -196,9 +195,12 @@ class LatexWriter:
         last = []
         for factor in dict.fromkeys(f for f in factors if f.op != "const"):
             count = factors.count(factor)
-            text = self._held(factor, index, depth, ATOM if count > 1 else UNCLOSED)
-            is_unclosed = count == 1 and self._written(factor, index, depth)[1] == UNCLOSED
-            (last if is_unclosed else texts).append(f"{text}^{{{count}}}" if count > 1 else text)
+            text, tightness = self._written(factor, index, depth)
+            if count > 1:
+                texts.append(f"{_held(text, tightness, ATOM)}^{{{count}}}")
+            else:
+                held = _held(text, tightness, UNCLOSED)
+                (last if tightness == UNCLOSED else texts).append(held)
         return ("-" if negative else "") + _product(
             [*texts, *map(_closed, last[:-1]), *last[-1:]] or ["1"]
         ), TERM
@@ -301,6 +303,10 @@ def _product(texts: list[str]) -> str:
         word = text.startswith(r"\mathrm") or joined.rpartition(" ")[2].startswith(r"\mathrm")
         joined += rf" \cdot {text}" if dot else rf" \, {text}" if word else f" {text}"
     return joined
+
+
+def _held(text: str, tightness: int, least: int) -> str:
+    return text if tightness >= least else rf"\left({text}\right)"
 
 
 def _closed(text: str) -> str:

@@ -16,6 +16,10 @@ from .graph import Expr, Graph, deduce, needed
 from .signs import POSITIVE
 
 RANGE = 36.0  # e^-36 is less than rounding
+# of the integrators of both engines, in this measure and in parts of a step
+LEADS = 8.0  # what a step may lead through: e^-8 of a pulse is seen
+UNEXAMINED = 2.0  # what an argument moves by in a step that is not examined
+SHORTER = 0.3  # part to be tried of a step that is too long
 ITSELF, AREA = 0, -1  # kinds; others are exponents
 _HIGH = 6  # powers from which on a function is as good as 0 around the root of what it is of
 # what functions are measured by, in arguments; erf(6) is 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .graph import Expr, Graph, needed, parts_first
+from .graph import Expr, Graph, deduce, needed
 from .signs import POSITIVE
 
 _MOST = 4  # divisors of one fraction: with each the products become longer
@@ -33,11 +33,12 @@ class Fraction(NamedTuple):
 def as_fraction(graph: Graph, expr: Expr) -> Fraction:
     """Return sums, products and quotients as one fraction, whatever else as it is."""
     fractions: dict[Expr, Fraction] = {}
-    for node in parts_first([expr], lambda e: e.args if _combines(e) else ()):
-        fraction = _of_parts(graph, node, fractions)
-        fits = fraction.count <= _MOST
-        fractions[node] = fraction if fits else Fraction(graph.number(node))
-    return fractions[expr]
+
+    def fraction(node: Expr) -> Fraction:
+        whole = _of_parts(graph, node, fractions)
+        return whole if whole.count <= _MOST else Fraction(graph.number(node))
+
+    return deduce(fractions, expr, lambda node: node.args if _combines(node) else (), fraction)
 
 
 def compared(graph: Graph, a: Fraction, b: Fraction) -> Expr:

@@ -12,14 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..expressions.sharp import AREA, ITSELF, RANGE
+from ..expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER, UNEXAMINED
 from .compiled import Compiled
 from .machine.evaluations import prepared_parameters
 from .machine.routine import Routine
-
-_MOST = 8.0  # as in machine code
-_CALM = 2.0  # what an argument moves by in a step that is not looked into
-_SHORTER = 0.3  # part of what is too long
 
 
 def followed(compiled: Compiled, p: np.ndarray) -> Callable[..., float] | None:
@@ -49,7 +45,9 @@ def followed(compiled: Compiled, p: np.ndarray) -> Callable[..., float] | None:
 def _part(kind: int, places: np.ndarray, values: np.ndarray) -> float:
     """Return up to which part of a step an argument with these values may be followed."""
     near, far = np.min(np.abs(values)), np.max(np.abs(values))
-    calm = np.ptp(values) < _CALM if kind == ITSELF else max(kind, 1) * (far - near) < 0.1 * near
+    calm = (
+        np.ptp(values) < UNEXAMINED if kind == ITSELF else max(kind, 1) * (far - near) < 0.1 * near
+    )
     if calm and (kind == ITSELF or abs(values.sum()) >= values.size * near):  # of one sign
         return 1.0
     least, most = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
@@ -59,11 +57,11 @@ def _part(kind: int, places: np.ndarray, values: np.ndarray) -> float:
         least[i], most[i] = min(least[i], extreme[k]), max(most[i], extreme[k])
     lower, upper = _measured(kind, least, most)
     led = np.maximum.accumulate(upper) - np.minimum.accumulate(lower)
-    too_far = np.flatnonzero(led > _MOST)
+    too_far = np.flatnonzero(led > LEADS)
     if not too_far.size:
         return 1.0
     k = int(too_far[0])
-    return float(max(places[k], _SHORTER * places[k + 1]))
+    return float(max(places[k], SHORTER * places[k + 1]))
 
 
 def _vertices(places: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

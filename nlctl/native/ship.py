@@ -40,13 +40,14 @@ def source_files(*modules: str) -> list[str]:
     """Return the files of the engine that modules are made of: themselves and what they import."""
     # By default those of the integrators.
     found = [*(modules or ("integrate/advance.py", "integrate/start.py", "integrate/workspace.py"))]
-    for name in found:  # which grows meanwhile
-        found += [other for other in dict.fromkeys(_imported(HERE / name)) if other not in found]
+    for name in found:  # which grows meanwhile; what others import from elsewhere is not compiled
+        imported = () if name.startswith("..") else _imported(HERE / name)
+        found += [other for other in dict.fromkeys(imported) if other not in found]
     return sorted(found)
 
 
 def _imported(path: Path) -> Iterator[str]:
-    """Yield the files of the engine that a file imports, by their paths inside of it."""
+    """Yield the files of nlctl that a file of the engine imports, by their paths from there."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
             folder = path.parents[node.level - 1]
@@ -56,7 +57,7 @@ def _imported(path: Path) -> Iterator[str]:
             yield from (
                 Path(os.path.relpath(file, HERE)).as_posix()
                 for file in files
-                if file.exists() and (file.is_relative_to(HERE) or file.name == "accumulation.py")
+                if file.exists() and file.is_relative_to(HERE.parent)
             )
 
 

@@ -13,7 +13,7 @@ from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
-from ...expressions.graph import ORDERS, Expr, Graph, needed, parts_first
+from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
@@ -311,14 +311,16 @@ def _frequencies(graph: Graph, term: Expr, timed: set[Expr]) -> tuple[Expr, ...]
         is_product = node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed)
         return is_product and node in timed and node.kind != "b"
 
-    for node in parts_first([term], lambda node: node.args if is_combined(node) else ()):
-        parts = [frequencies[arg] for arg in node.args] if is_combined(node) else []
+    def those_of(node: Expr) -> tuple[Expr, ...] | None:
+        if node not in timed or node.op == "leaf" or node.kind == "b":
+            return ()
+        if not is_combined(node):
+            return _frequency(graph, node)
+        parts = [frequencies[arg] for arg in node.args]
         several = tuple(slope for part in parts for slope in part or ())
-        has_highest = None not in parts and len(several) <= _MOST_FREQUENCIES
-        frequencies[node] = several if has_highest else None
-        if node in timed and node.op != "leaf" and node.kind != "b" and not parts:
-            frequencies[node] = _frequency(graph, node)
-    return frequencies[term]
+        return several if None not in parts and len(several) <= _MOST_FREQUENCIES else None
+
+    return deduce(frequencies, term, lambda e: e.args if is_combined(e) else (), those_of)
 
 
 def _frequency(graph: Graph, node: Expr) -> tuple[Expr, ...] | None:

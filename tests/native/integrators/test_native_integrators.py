@@ -42,6 +42,8 @@ def test_all_that_is_compiled_belongs_to_these_sources():
     modules = {each.function.__module__ for each in WANTED}
     files = {f"{'/'.join(name.split('.')[2:])}.py" for name in modules}
     assert files <= set(source_files())
+    constants = {"../accumulation.py", "../expressions/sharp.py"}  # and functions, from elsewhere
+    assert constants <= set(source_files())
     needed = ("methods/explicit", "methods/rodas5p", "memory", "samples")
     needed += ("events/location", "events/excursions", "events/near_side")
     assert {f"integrate/{name}.py" for name in needed} <= set(source_files())

@@ -128,7 +128,7 @@ def test_a_doubt_is_the_largest_distance_from_what_neighbours_say(seed, n):
         for start in range(begin, min(begin + 3, n - count + 1)):
             others = [j for j in range(start, start + count) if j != k]
             distances.append(abs(KroghInterpolator(t[others], y[others])(t[k]) - y[k]))
-        doubt = _doubt(t, y, _differences(t, y), k)
+        doubt = _doubt(t, y, _differences(t, y, count), k)
         assert doubt == pytest.approx(max(distances), rel=1e-6, abs=2e-12)
 
 

@@ -3,7 +3,7 @@
 Neither error control nor what is known of conditions from a few values sees a pulse between two
 places at which it is 0 to rounding.  What moves gently there is the argument, see
 `nlctl.expressions.sharp`: the polynomial through five of its values says how far it leads.  Where
-it moves by more than `_MOST` within the range in which the function is not flat, a shorter step is
+it moves by more than `LEADS` within the range in which the function is not flat, a shorter step is
 tried, and where a polynomial does not follow it, too.
 """
 
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ....expressions.sharp import AREA, ITSELF, RANGE
+from ....expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER, UNEXAMINED
 from ...machine.address import call_out
 from ..control import shorten
 from ..evaluate import inputs_at, on_this_side
@@ -24,12 +24,9 @@ from ..methods.quartic import least_value, polynomial_at, quartic
 from ..state import INNER, opposite
 from .location import AGAIN
 
-_MOST = 8.0  # e^-8 of a pulse is seen
-_AIM = 0.8  # of that: what a shorter step is to lead through
+_AIM = 0.8  # of what a step may lead through: what a shorter step is to lead through
 _WRONG = 4.0  # what a polynomial may be wrong by where it may lead into the range
 _FAR = 3.0  # times that: it does not lead there
-_SHORTER = 0.3  # part of a step to be tried where it is not followed
-_CALM = 2.0  # what an argument moves by in a step that is not looked into
 _WITHIN = 2.0  # times what it moves by from end to end: it gets no farther in between
 _ROUNDING = 1e-9  # of a step
 _LEAST = 0.005  # part of a step to be tried at least
@@ -100,10 +97,10 @@ def _is_calm(task, lane, w, j):
         if kind == ITSELF:
             is_far = max(before, end) + _WITHIN * most < -RANGE
             is_far |= min(before, end) - _WITHIN * most > RANGE
-            calm &= most <= _CALM or is_far
+            calm &= most <= UNEXAMINED or is_far
         else:
             nearest = min(abs(end), abs(before)) + (1.0 if kind == AREA else 0.0)
-            calm &= max(kind, 1) * most <= _CALM * nearest
+            calm &= max(kind, 1) * most <= UNEXAMINED * nearest
     return calm
 
 
@@ -175,7 +172,7 @@ def _any_moves(task, w, j):
             if nearest > max(kind, 1) * apart:
                 continue
             apart = _measure(kind, max(most, -least)) - max(_measure(kind, nearest), -RANGE)
-        if apart > _AIM * _MOST:
+        if apart > _AIM * LEADS:
             return 1
     return 0
 
@@ -214,13 +211,13 @@ def _followed(task, w, i, j):
     if _is_flat(kind, least - _FAR * wrong, most + _FAR * wrong):
         return 1.0
     if not _blurred(kind, nearest, wrong) <= _WRONG:
-        return _SHORTER
-    if _led(kind, newton, at, 1.0, lowest, highest) <= _MOST:
+        return SHORTER
+    if _led(kind, newton, at, 1.0, lowest, highest) <= LEADS:
         return 1.0
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if _led(kind, newton, at, middle, lowest, highest) <= _AIM * _MOST:
+        if _led(kind, newton, at, middle, lowest, highest) <= _AIM * LEADS:
             low = middle
         else:
             high = middle
