@@ -38,14 +38,14 @@ def known_conditions(
     except (CompileError, AlgebraicLoopError, UsageError):
         return known_conditions(system, params, times) if watched else Known()
     found = {k: v[0] for k, v in ahead(lowered.timed, p[:, None], times, np.inf).items()}
-    jumps = found["jumps"][np.isfinite(found["jumps"])]
+    stops = np.stack([found["until"], found["jumps"]])[:, np.isfinite(found["jumps"])]
     located = lowered.conditions.rows - len(watched)  # these the run watches itself
     if not located:
-        return Known(stops=jumps, longest=_longest(found, times), followed=followed(compiled, p))
+        return Known(stops=stops, longest=_longest(found, times), followed=followed(compiled, p))
     first = compiled.program.switching
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
     return Known(
-        stops=jumps, longest=_longest(found, times), labels=tuple(labels),
+        stops=stops, longest=_longest(found, times), labels=tuple(labels),
         partners=tuple(lowered.conditions.partners[:located]), followed=followed(compiled, p),
         crossings=_crossings(compiled, p, slice(first, first + located)),
     )  # fmt: skip

@@ -138,7 +138,7 @@ class Driver:
 
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
-        self._held, self._last = x, float(np.nextafter(stop, -np.inf))
+        self._held, self._last = x, self.stops.before(stop)
         rounding = TIME_ROUNDING * max(abs(t), abs(stop), self._span)
         if stop - t <= rounding:  # only that sets them apart
             self._record_within(stop, lambda _: x, closes=True)

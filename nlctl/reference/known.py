@@ -19,8 +19,8 @@ def _unbounded(t: float) -> float:
 class Known:
     """Conditions of a diagram's equations, as far as these can be read."""
 
-    # times (s) at which conditions of t alone change
-    stops: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    # times (s) until which conditions of t alone are as they were, and when they have changed
+    stops: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
     # ``longest(t)``: how long a step from there may be (s), so that nothing that is a function of
     # t alone is stepped over
     longest: Callable[[float], float] = _unbounded

@@ -32,8 +32,9 @@ class Stops:
         what = (due.patterns[i] for i in due.which)
         self.due: dict[float, Happening] = dict(zip(due.times.tolist(), what, strict=True))
         self.borders, self.spaces = _spacing(grid)
-        self.longest, self.changes = conditions.longest, frozenset(conditions.stops.tolist())
-        known = (due.times, _break_points(times, inputs), conditions.stops)
+        self.longest, self._changes = conditions.longest, conditions.stops
+        self.changes = frozenset(conditions.stops[1].tolist())
+        known = (due.times, _break_points(times, inputs), conditions.stops[1])
         self.breaks = np.unique(np.concatenate(known))
         every = np.union1d(self.breaks, np.append(self.borders, end))
         self.times = every[(every > begin) & (every <= end)]
@@ -41,6 +42,12 @@ class Stops:
     def after(self, t: float) -> float:
         """Return the next stop after a time."""
         return float(self.times[np.searchsorted(self.times, t, side="right")])
+
+    def before(self, t: float) -> float:
+        """Return the last time before a stop at which functions of t alone are as they were."""
+        until, changed = self._changes
+        later = until[np.searchsorted(changed, t) :][:1]
+        return float(np.min([np.nextafter(t, -np.inf), *later]))
 
     def is_break(self, t: float) -> bool:
         """Whether a signal or one of its derivatives may jump at a stop."""

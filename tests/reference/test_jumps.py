@@ -346,7 +346,12 @@ def traced(system, times, start, stops=(), crossings=None):
                         "max_step": None},
     )  # fmt: skip
     labels = () if crossings is None else (("loop", "gt"),)
-    known = Known(stops=np.array(stops), crossings=crossings, labels=labels)
+    changed = np.array(stops, dtype=float)
+    known = Known(
+        stops=np.array([np.nextafter(changed, -np.inf), changed]),
+        crossings=crossings,
+        labels=labels,
+    )
     return python_control_response(arguments, lambda *_: known)
 
 

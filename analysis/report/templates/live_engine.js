@@ -61,7 +61,7 @@ const engineOf = async (bytes, facts) => {
   const switched = (fastest) => {
     const waves = (fastest * (facts.end - facts.begin)) / (2 * Math.PI);
     const grid = evenly(facts.begin, facts.end, Math.min(Math.max(8192, Math.ceil(32 * waves)), 2e5) + 1);
-    const found = new Set();
+    const found = new Map();  // the first time behind a switch: the last before it
     let before = levels(grid[0]);
     for (let k = 1; k < grid.length; k++) {
       const now = levels(grid[k]);
@@ -72,11 +72,11 @@ const engineOf = async (bytes, facts) => {
           if (levels(middle)[i] === before[i]) low = middle;
           else high = middle;
         }
-        if (high > facts.begin) found.add(high);
+        if (high > facts.begin) found.set(high, low);
       }
       before = now;
     }
-    return [...found].sort((a, b) => a - b);
+    return [...found].sort((a, b) => a[0] - b[0]);
   };
   const reached = () => {
     const limit = new Float64Array(facts.cells).fill(Infinity);
@@ -113,7 +113,10 @@ const engineOf = async (bytes, facts) => {
       known.reach = facts.cells ? reached() : [];
     }
     numbers("task.timed.longest", 1)[0] = known.longest;
-    if (facts.jumps) numbers("task.timed.jumps", facts.jumps).fill(Infinity).set(known.jumps);
+    if (facts.jumps) {
+      numbers("task.timed.jumps", facts.jumps).fill(Infinity).set(known.jumps.map(([behind]) => behind));
+      numbers("task.timed.until", facts.jumps).fill(Infinity).set(known.jumps.map(([, before]) => before));
+    }
     if (facts.cells) numbers("task.timed.reach", facts.cells).set(known.reach);
   };
 

@@ -92,14 +92,14 @@ def _happenings(compiled: Compiled, p: np.ndarray, stop_time: float, what: str) 
     series, meetings = _series(clocks, compiled, what)
     timed = compiled.lowered.timed
     known = ahead(timed, p[:, None], np.array([0.0, stop_time]), np.inf)
-    breaks = known["jumps"][0]
+    pairs = zip(known["until"][0].tolist(), known["jumps"][0].tolist(), strict=True)
     longest = float(known["longest"][0])
     reach = known["reach"][0]
     if reach.size:  # no step may pass over half of a pulse, wherever it begins
         begins = np.linspace(0.0, stop_time, reach.size + 1)[:-1]
         longest = min(longest, float(np.min(reach - begins)))
     return Happenings(
-        series=series, meetings=meetings, breaks=tuple(breaks[np.isfinite(breaks)].tolist()),
+        series=series, meetings=meetings, breaks=tuple(pair for pair in pairs if pair[1] < np.inf),
         known_until=stop_time if timed.conditions.of_time else np.inf, longest=longest,
     )  # fmt: skip
 

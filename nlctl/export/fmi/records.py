@@ -45,7 +45,8 @@ class Happenings:
     # instants of samples: begin, step and scale of (begin + k step) / scale
     series: tuple[tuple[int, int, int], ...]
     meetings: tuple[int, ...]  # of each function of samples which series it is for, as bits
-    breaks: tuple[float, ...]  # when conditions of t alone switch (s)
+    # until when conditions of t alone are as they were, and when they have switched (s)
+    breaks: tuple[tuple[float, float], ...]
     known_until: float  # how long these are known (s)
     longest: float  # longest step that meets all that functions of t alone do (s)
 

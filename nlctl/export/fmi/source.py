@@ -60,7 +60,7 @@ typedef struct {{
 }} Bounds;
 
 extern const double model_start[N_STATES + 1], model_parameters[N_PARAMETERS + 1];
-extern const double model_breaks[N_BREAKS + 1], model_series[N_SERIES + 1][3];
+extern const double model_breaks[N_BREAKS + 1][2], model_series[N_SERIES + 1][3];
 extern const Bounds model_bounds[N_PARAMETERS + 1];
 extern const unsigned model_meetings[N_MEETINGS + 1];
 extern const int model_continuous[N_STATES + 1], model_memory[N_MEMORY + 1];
@@ -186,7 +186,7 @@ def _tables(model: Model) -> str:
     return "\n".join([
         _table("double model_start", map(c_number, model.start)),
         _table("double model_parameters", map(c_number, model.parameters)),
-        _table("double model_breaks", map(c_number, what.breaks)),
+        _table("double model_breaks", (_list(map(c_number, b)) for b in what.breaks), "[2]"),
         _table("double model_series", (_list(f"{n}.0" for n in s) for s in what.series), "[3]"),
         _table("Bounds model_bounds", bounds, empty="{0.0, 0.0, 0, 0, 0, 0}"),
         _table("unsigned model_meetings", map(str, what.meetings)),

@@ -33,11 +33,12 @@ from .timed import TimedProgram, timed_program
 NOTED = 8192  # events of one run, for which there is room on a page
 _BREAKS = 4096  # switches of functions of time alone
 _MOST = 64 * 2**20  # bytes of a run's memory
-_FILLED = ("task.p", "task.timed.jumps", "task.timed.reach", "work.samples", "work.y")
+_FILLED = ("task.p", "task.timed.jumps", "task.timed.until", "task.timed.reach",
+           "work.samples", "work.y")  # fmt: skip
 _READ = (
     "live.p", "live.t", "live.s", "task", "task.p", "task.times", "task.inputs",
-    "task.timed.jumps", "task.timed.longest", "task.timed.reach", "work.lanes", "work.x",
-    "work.samples", "work.y", "work.log.t", "work.log.row",
+    "task.timed.jumps", "task.timed.until", "task.timed.longest", "task.timed.reach",
+    "work.lanes", "work.x", "work.samples", "work.y", "work.log.t", "work.log.row",
 )  # fmt: skip
 _OF_LANE = ("t", "status", "accepted", "rejected", "noted")
 
@@ -178,9 +179,10 @@ def _laid_out(
     conditions = compiled.lowered.conditions
     timed = task.timed
     if conditions.of_time:
-        jumps = np.full((1, _BREAKS), np.inf)
-        jumps[0, : timed.jumps.shape[1]] = timed.jumps[0, :_BREAKS]
-        timed = with_fields(timed, jumps=jumps)
+        room = np.full((2, 1, _BREAKS), np.inf)
+        count = min(timed.jumps.shape[1], _BREAKS)
+        room[:, :, :count] = timed.until[:, :count], timed.jumps[:, :count]
+        timed = with_fields(timed, until=room[0], jumps=room[1])
     n = compiled.nstates or 0
     stiff = stiff_method(n, DIFFERENCES, task.stiff.c, WHOLE)
     task = with_fields(task, timed=timed, stiff=stiff)

@@ -8,9 +8,9 @@ there by arithmetic alone is therefore left as it is, and is computed operation 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
-from ...expressions.graph import COMPARISONS, Expr, Graph, needed
+from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
 from .plan import Store
 
 _JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod", "copysign")
@@ -37,16 +37,22 @@ def rewritten(
     return new_stores, frozenset(new[node] for node in decisive), fresh
 
 
-def _decisive(nodes: Sequence[Expr]) -> set[Expr]:
-    """Return what reaches a jump by arithmetic alone."""
-    decisive: set[Expr] = set()
+def _decisive(nodes: Sequence[Expr], jumps: Collection[Expr] = ()) -> set[Expr]:
+    """Return what reaches a jump, or one of `jumps`, by arithmetic alone; parts come first."""
+    decisive = set(jumps)
     for node in reversed(nodes):
         passes = node in decisive and node.op in (*ALGEBRAIC, *_PARTS)
-        if node.op in _JUMPS or passes:
+        if node.op in _JUMPS or passes or node in jumps:
             decisive.update(node.args)
         elif node.op == "select":
             decisive.add(node.args[0])
     return decisive
+
+
+def computed_as_written(nodes: Sequence[Expr], jump: Expr) -> set[Expr]:
+    """Return what is rounded on its way to a jump as NumPy rounds it: parts come first in nodes."""
+    alike = (*ALGEBRAIC, *_PARTS, *_JUMPS, *LOGIC, jump.op)
+    return {node for node in _decisive(nodes, [jump]) if node.op in alike or not node.args}
 
 
 def _reworded(graph: Graph, node: Expr, args: tuple[Expr, ...]) -> Expr | None:

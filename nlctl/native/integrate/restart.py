@@ -7,6 +7,7 @@ import numpy as np
 
 from .evaluate import evaluate
 from .events.functions import begin_next
+from .samples import time_rounding
 from .state import INNER, opposite
 
 FAR = 1e6
@@ -55,11 +56,15 @@ def _is_between(task, w, j):
 def restart(rhs, task, lanes, w, chosen):
     """Make the chosen lanes' derivatives, event functions and memories those of their state."""
     # What is carried along is first what it was at the end of the step, before anything jumps.
-    memories = w.memories
+    # A sample taken there is shown with what the signals make of that, on whichever side it lies.
+    memories, rounding = w.memories, time_rounding(task)
     for i in range(memories.m.shape[0]):
         for j in range(lanes.size):
             if chosen[j] and memories.rate_start[i, j] != 0.0:
-                w.x[task.rows.memory[i], j] = memories.m[i, j]
+                row, segment = task.rows.memory[i], lanes[j].segment
+                w.x[row, j] = memories.m[i, j]
+                if lanes[j].t - task.times[segment] <= rounding:
+                    w.samples[segment, row, j] = memories.m[i, j]
     _refresh(rhs, task, lanes, w, chosen)
     if memories.m.shape[0]:
         for _ in range(memories.m.shape[0]):  # one that commits may move the next

@@ -28,7 +28,8 @@ class Ticks(NamedTuple):
 class Timed(NamedTuple):
     """What is known before a run of functions of t alone."""
 
-    jumps: Reals2  # (lanes, instants): when they jump or have kinks, then inf
+    jumps: Reals2  # (lanes, instants): when they have jumped or have kinks, then inf
+    until: Reals2  # (lanes, instants): until when they are what they were before that
     longest: Reals1  # (lanes,) step in s that none may be longer than
     reach: Reals2  # (lanes, cells): until when a step may lead that begins in a cell
     opaque: float  # longest step from rest where something is called as it stands (s), otherwise 0
@@ -84,11 +85,17 @@ def take_samples(task, lanes, w, sampled):
 
 
 @numba.njit(**INNER)
+def time_rounding(task):
+    """Return by how little two times of a run differ that are the same (s)."""
+    return 1e-14 * max(abs(task.times[0]), abs(task.times[task.times.size - 1]))
+
+
+@numba.njit(**INNER)
 def pass_jumps(task, lanes, jumped):
     """Go on to the other side of the break points that lanes have come to; fill ``jumped``."""
     # Return whether any lane has come to one.
     found, count = False, task.timed.jumps.shape[1]
-    rounding = 1e-14 * max(abs(task.times[0]), abs(task.times[task.times.size - 1]))
+    rounding = time_rounding(task)
     for j in range(lanes.size):
         lane = lanes[j]
         jumped[j] = False
@@ -96,16 +103,9 @@ def pass_jumps(task, lanes, jumped):
             lane.right = task.timed.jumps[j, lane.jump]
             lane.jump += 1
             jumped[j] = True
-        next_one = task.timed.jumps[j, lane.jump] if lane.jump < count else np.inf
-        lane.left = before(next_one)
+        lane.left = task.timed.until[j, lane.jump] if lane.jump < count else np.inf
         found |= jumped[j]
     return found
-
-
-@numba.njit(**INNER)
-def before(t):
-    """Return the number before a time."""
-    return np.nextafter(t, -np.inf) if t < np.inf else t
 
 
 @numba.njit(**INNER)

@@ -8,7 +8,7 @@ by sampling (Parker, Pierce, Eggert 2000, Monte Carlo arithmetic).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -114,6 +114,14 @@ def nudged_values(
     return reader.read(results)
 
 
+def nudged_columns(
+    results: Iterable[Expr], arrays: Mapping[str, np.ndarray], columns: int,
+    alike: Collection[Expr],
+) -> list[np.ndarray]:  # fmt: skip
+    """Return the values of expressions at many points, each rounded in one way but for `alike`."""
+    return _Reader(arrays, {}, {}, columns, alike).read(list(results))
+
+
 def _moved(search: Any, values: Iterable[np.ndarray]) -> Any:
     """Return a search whose results are moved as far as their fixed points were."""
     far = [np.broadcast_to(v, (ROUNDINGS,)) - np.broadcast_to(v, (ROUNDINGS,))[0] for v in values]
@@ -130,8 +138,11 @@ class _Reader:
 
     # Of two that use it one may have been computed in another way, as powers are by products.
 
-    def __init__(self, arrays: Mapping[str, np.ndarray], searches: Functions, calls: Functions):
-        self.arrays = arrays
+    def __init__(
+        self, arrays: Mapping[str, np.ndarray], searches: Functions, calls: Functions,
+        columns: int = ROUNDINGS, alike: Collection[Expr] = (),
+    ) -> None:  # fmt: skip
+        self.arrays, self.columns, self.alike = arrays, columns, alike
         self.drawn = np.random.default_rng(2017)  # the same directions in every comparison
         shaken = {name: _columns(function, self.drawn) for name, function in calls.items()}
         self.functions = {**searches, **shaken}
@@ -146,14 +157,14 @@ class _Reader:
                 parts = [nudge(arg, values[arg]) for arg in node.args]
                 values[node] = value_of(node, parts, self.arrays, self.functions)
                 if node.op == "sum":  # relative to its terms: their order is not said
-                    scale = np.broadcast_to(np.abs(parts[0]).sum(axis=0), (ROUNDINGS,))
+                    scale = np.broadcast_to(np.abs(parts[0]).sum(axis=0), (self.columns,))
                     values[node] = values[node] + scale * self.ways(None)
             return [self.rounded(expr, values[expr]) for expr in results]
 
     def rounded(self, node: Expr, value: np.ndarray) -> np.ndarray:
         """Return a value with other last digits behind its first column."""
         is_whole = node.op in ("const", "table") and np.all(value == np.trunc(value))
-        if node.op in _EXACT or node.kind != "f" or is_whole:
+        if node.op in _EXACT or node.kind != "f" or is_whole or node in self.alike:
             return value
         return self.nudged(node, value)
 
@@ -163,7 +174,7 @@ class _Reader:
 
     def ways(self, size: int | None) -> np.ndarray:
         """Return relative changes."""
-        shape = (size, ROUNDINGS) if size else (ROUNDINGS,)
+        shape = (size, self.columns) if size else (self.columns,)
         directions = unit() * self.drawn.choice((-1.0, 1.0), size=shape)
         directions[..., 0] = 0.0
         return directions

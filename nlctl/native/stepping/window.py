@@ -153,8 +153,7 @@ def _begin(run: Run) -> None:
     if timed.jumps.shape[1]:
         rounding = 1e-14 * np.abs(run.task.times[[0, -1]]).max()
         lane["jump"] = np.searchsorted(timed.jumps[0], lane["t"] + rounding, "right")
-        left = timed.jumps[0, lane["jump"] :][:1]
-        lane["left"] = np.nextafter(left[0], -np.inf) if left.size else np.inf
+        lane["left"] = np.append(timed.until[0], np.inf)[lane["jump"]]
 
 
 _LINE = 64  # bytes of a line of the cache

@@ -22,7 +22,8 @@ _PART = 0.5  # of its range: what a function may go up and down by in one step
 class Ahead:
     """When functions of time alone switch (s), and the longest steps."""
 
-    breaks: np.ndarray  # increasing times
+    until: np.ndarray  # increasing times: the last before each switch
+    breaks: np.ndarray  # and the first behind it
     longest: float  # half a wave of the fastest sine
     reach: np.ndarray  # shape (cells,): see `reach`
 
@@ -54,14 +55,14 @@ def ahead(
     count = p.shape[1]
     span = float(times[0]), float(times[-1])
     own = [_of(timed, p[:, j], span) for j in range(count)]
-    jumps = np.full((count, max(one.breaks.size for one in own)), np.inf)
+    jumps = np.full((2, count, max(one.breaks.size for one in own)), np.inf)
     limits = np.full((count, max(one.reach.size for one in own)), np.inf)
     for j, one in enumerate(own):
-        jumps[j, : one.breaks.size] = one.breaks
+        jumps[:, j, : one.breaks.size] = one.until, one.breaks
         if one.reach.size:
             limits[j] = one.reach
     longest = np.minimum(max_step, np.array([one.longest for one in own]))
-    return {"jumps": jumps, "longest": longest, "reach": limits}
+    return {"until": jumps[0], "jumps": jumps[1], "longest": longest, "reach": limits}
 
 
 def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
@@ -72,13 +73,9 @@ def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
             cache.clear()
         fastest = _fastest(conditions.waves, p)
         pulses = reach(conditions.pulses, p, span) if conditions.pulses else np.zeros(0)
-        breaks = (
-            break_points(conditions.of_time, p, span, fastest)
-            if conditions.of_time
-            else np.zeros(0)
-        )
+        until, breaks = break_points(conditions.of_time, p, span, fastest)
         longest = np.pi / fastest if fastest else np.inf
-        cache[key] = Ahead(breaks=breaks, longest=longest, reach=pulses)
+        cache[key] = Ahead(until=until, breaks=breaks, longest=longest, reach=pulses)
     return cache[key]
 
 

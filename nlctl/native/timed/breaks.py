@@ -1,4 +1,4 @@
-"""When conditions of time alone switch, to the last digit."""
+"""When conditions of time alone switch, to the last digit or to rounding."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ from functools import partial
 import numpy as np
 
 from ...expressions.evaluate import evaluate_expressions
-from ...expressions.graph import Expr
+from ...expressions.graph import Expr, needed
+from ..codegen.rewrite import computed_as_written
+from ..rounding.nudged import nudged_columns
 from .lines import Lines, NotLines, as_lines, levels_met, switches
 
 _GRID = 8192  # places at which a condition is looked at that is not made of lines
 _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
+
+_ROUNDINGS = 8  # ways of rounding in which a condition must agree on either side of its switch
+_WIDER = 4.0
 
 Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 # of times: one integer between two switches and another one behind
@@ -23,34 +28,89 @@ Indicator = Callable[[np.ndarray], np.ndarray]
 
 def break_points(
     conditions: Sequence[Expr], p: np.ndarray, span: tuple[float, float], fastest: float
-) -> np.ndarray:
-    """Return when conditions of t alone switch within a run with one parameter vector."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return until when conditions of t alone are as they were, and when they have switched.
 
-    def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
-        numbers = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
-        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in numbers]
+    Within a run, with one parameter vector.  Between the two it depends on how a sine is rounded.
+    """
+    given = p[:, None]
 
     def constant(expr: Expr) -> np.ndarray:
-        (number,) = evaluate_expressions([expr], {"p": p[:, None]})
+        (number,) = evaluate_expressions([expr], {"p": given})
         return np.squeeze(number)
+
+    def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
+        return _rows(evaluate_expressions(exprs, {"t": t[None, :], "p": given}), t)
+
+    def otherwise(alike: set[Expr], exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
+        arrays = {"t": t[None, :], "p": given}
+        return _rows(nudged_columns(exprs, arrays, t.size, alike), t)
 
     args = [arg for c in conditions for arg in c.args if arg.size is None]
     lines = as_lines(args, constant, span)
-    instants = [np.zeros(0)]
+    jumps, until = [np.zeros(0)], [np.zeros(0)]
     for condition in conditions:
         crossed, elements = _known(condition, lines), range(condition.size or 1)
-        indicators: list[Indicator] = [partial(_level, condition, values, k) for k in elements]
+        levels = [partial(_level, condition, k) for k in elements]
+        nodes = needed([condition])
+        alike = computed_as_written(nodes, condition)
+        is_rounded = any(node not in alike and node.args for node in nodes)
         if crossed is None:
             crossed = levels_met(condition, lines, constant)
-            if crossed is not None:  # how many elements hold
-                indicators = [lambda t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
-        for indicator in indicators:
+            if crossed is not None:
+                levels = [partial(_how_many, condition)]
+        for level in levels:
+            indicator: Indicator = partial(level, values)
             if crossed is None:
-                instants.append(_sought(indicator, span, fastest))
+                at = _sought(indicator, span, fastest)
             else:
-                instants.append(_exact(indicator, crossed, span))
-    every = np.unique(np.concatenate(instants))
-    return every[(every > span[0]) & (every <= span[1])]
+                at = _exact(indicator, crossed, span)
+            at = at[(at > span[0]) & (at <= span[1])]
+            sides = np.nextafter(at, -np.inf), at
+            if is_rounded:
+                nudged = partial(level, partial(otherwise, alike))
+                sides = _beyond_rounding(indicator, nudged, sides, span)
+            until.append(sides[0])
+            jumps.append(np.minimum(sides[1], span[1]))
+    behind = np.concatenate(jumps)
+    order = np.argsort(behind, kind="stable")
+    behind, first = np.unique(behind[order], return_index=True)
+    before = np.minimum.accumulate(np.concatenate(until)[order][::-1])[::-1]
+    return before[first], behind
+
+
+def _rows(values: list[np.ndarray], t: np.ndarray) -> list[np.ndarray]:
+    return [np.broadcast_to(rows, t.shape) if rows.ndim < 2 else rows for rows in values]
+
+
+def _beyond_rounding(
+    indicator: Indicator,
+    otherwise: Indicator,  # the same, of which each value is rounded in a way of its own
+    sides: tuple[np.ndarray, np.ndarray],
+    span: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return times before and behind switches at which a condition has one value, however rounded.
+
+    A memory that has seen the other side too early, or too late, goes the wrong way for good.
+    """
+    at = sides[1]
+    most = np.full(at.size, _NEAR * max(map(abs, span)))
+    for gaps in (np.diff(at, prepend=-np.inf), np.diff(at, append=np.inf)):
+        most = np.minimum(most, 0.25 * gaps)
+    found = []
+    for side, way in zip(sides, (-1.0, 1.0), strict=True):
+        value, width = indicator(side), np.zeros(at.size)
+        sure, open_ = side.copy(), np.arange(at.size)
+        while open_.size:
+            tried = at[open_] + way * width[open_]
+            same = otherwise(np.repeat(tried, _ROUNDINGS)).reshape(-1, _ROUNDINGS)
+            agree = np.all(same == value[open_, None], axis=1)
+            sure[open_[agree]] = tried[agree]
+            width = np.maximum(_WIDER * width, np.spacing(np.abs(at)))
+            open_ = open_[~agree]
+            open_ = open_[width[open_] <= most[open_]]
+        found.append(sure)
+    return found[0], found[1]
 
 
 def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
@@ -63,7 +123,12 @@ def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
         return None
 
 
-def _level(condition: Expr, values: Values, k: int, t: np.ndarray) -> np.ndarray:
+def _how_many(condition: Expr, values: Values, t: np.ndarray) -> np.ndarray:
+    """Return how many elements of a condition hold."""
+    return np.asarray(values([condition], t)[0].sum(axis=0) * 1.0)
+
+
+def _level(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray:
     """Return the indicator of an element."""
     op, args = condition.op, condition.args
 

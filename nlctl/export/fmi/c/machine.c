@@ -28,7 +28,7 @@ static double rounding(double t) { return 1e-12 * fmax(fabs(t), 1.0); }
 static double seen(const Machine *s, double t)
 {
   if (t < s->began) t = s->began;
-  return t < s->next ? t : nextafter(s->next, -INFINITY);
+  return t < s->until ? t : s->until;
 }
 
 void machine_changed(Machine *s) { s->known = s->outputs_known = 0; }
@@ -69,7 +69,10 @@ static void look_ahead(Machine *s)
 {
   s->next = INFINITY;
   for (int k = 0; k < N_SERIES; ++k) s->next = fmin(s->next, instant(s, k));
-  if (s->at_break < N_BREAKS) s->next = fmin(s->next, model_breaks[s->at_break]);
+  s->until = nextafter(s->next, -INFINITY);
+  if (s->at_break == N_BREAKS) return;
+  s->next = fmin(s->next, model_breaks[s->at_break][1]);
+  s->until = fmin(s->until, model_breaks[s->at_break][0]);
 }
 
 static void begin_instants(Machine *s)
@@ -81,7 +84,7 @@ static void begin_instants(Machine *s)
     while (instant(s, k) < early) s->index[k] += 1.0;
   }
   s->at_break = 0;
-  while (s->at_break < N_BREAKS && model_breaks[s->at_break] <= s->t) ++s->at_break;
+  while (s->at_break < N_BREAKS && model_breaks[s->at_break][1] <= s->t) ++s->at_break;
   s->began = s->t;
   look_ahead(s);
 }
@@ -98,8 +101,8 @@ static unsigned due(Machine *s)
     s->began = fmax(s->began, instant(s, k));
     s->index[k] += 1.0;
   }
-  while (s->at_break < N_BREAKS && model_breaks[s->at_break] <= late)
-    s->began = fmax(s->began, model_breaks[s->at_break++]);
+  while (s->at_break < N_BREAKS && model_breaks[s->at_break][1] <= late)
+    s->began = fmax(s->began, model_breaks[s->at_break++][1]);
   look_ahead(s);
   return which;
 }
@@ -514,7 +517,7 @@ void machine_begin(Machine *s)
   memset(s, 0, sizeof *s);
   memcpy(s->x, model_start, N_STATES * sizeof(double));
   memcpy(s->p, model_parameters, N_PARAMETERS * sizeof(double));
-  s->next = s->h = INFINITY;
+  s->next = s->until = s->h = INFINITY;
   s->began = s->fell = -INFINITY;
   s->tolerance = TOLERANCE;
   for (int i = 0; i < N_GUARDS; ++i) s->rising[i] = NAN;

@@ -8,6 +8,7 @@ typedef struct {
   double t;      /* time (s) */
   double began;  /* the last instant at which something was due */
   double next;   /* the next one, INFINITY if there is none */
+  double until;  /* the last time at which functions of t alone are what they are now */
   double h;      /* the step that the integrator tries next */
   double tolerance;
   double last;   /* length of the last step, 0 in Model Exchange */
