@@ -50,7 +50,7 @@ def _decisive(nodes: Sequence[Expr], jumps: Collection[Expr] = ()) -> set[Expr]:
 
 
 def computed_as_written(nodes: Sequence[Expr], jump: Expr) -> set[Expr]:
-    """Return what is rounded on its way to a jump as NumPy rounds it: parts come first in nodes."""
+    """Return what a jump is computed of that is rounded as NumPy rounds it; parts come first."""
     alike = (*ALGEBRAIC, *_PARTS, *_JUMPS, *LOGIC, jump.op)
     return {node for node in _decisive(nodes, [jump]) if node.op in alike or not node.args}
 
