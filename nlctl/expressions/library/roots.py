@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 
-_PASSES = 30  # that are written out of Brent's method: it takes 5 to 12
-
 
 @functools.cache
 def roots() -> dict[Any, Callable[..., Any]]:
@@ -35,7 +33,7 @@ def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
     xblk, fblk, spre, scur = xpre, fpre, xcur - xpre, xcur - xpre
     stop = (fpre == 0) | (fcur == 0)
     xcur = np.where(fpre == 0, xpre, xcur)
-    for _ in range(min(maxiter, _PASSES)):
+    for _ in range(maxiter):
         if stop:
             return xcur
         if fpre * fcur < 0:
