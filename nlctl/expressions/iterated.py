@@ -349,8 +349,8 @@ class Loop:
             self.graph.passing.pop()
         self.graph.of_passes |= self.later - self.first
         if self.is_cut:
-            self.graph.is_cut = True
-            self.fails()
+            self.graph.limited(self.graph.op("not", self.running))
+            self.running = self.graph.const(False)
 
     def fails(self) -> None:
         """Note that Python raises an error, or would still be busy, where the loop runs."""

@@ -119,7 +119,9 @@ def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
         return handed_out_again(walk.call(wrapped, given))
-    if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
+    if thing in (np.errstate, warnings.catch_warnings) or (
+        isinstance(thing, type) and issubclass(thing, BaseException)
+    ):
         return FRESH
     owner = getattr(thing, "__self__", None)
     if _is_builtin(thing):
