@@ -251,10 +251,9 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
-        if (getattr(real, "__module__", None) or "").startswith("scipy.optimize") and (
-            search := roots().get(real)
-        ):
-            return self.copied(search)
+        if (getattr(real, "__module__", None) or "").startswith("scipy.optimize"):
+            search = roots().get(real)
+            return self.for_numbers(real) if search is None else self.copied(search)
         if isinstance(real, np.ufunc):
             self._is_known(real)
             is_written = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
@@ -294,7 +293,12 @@ class Stage:
                 if written is None:
                     raise Untraceable(f"{_title(real)} is not known here")
                 return self._traced_library(real, written, arguments, options)
-            return self.fresh(real(*every, **named))
+            try:
+                return self.fresh(real(*every, **named))
+            except (Untraceable, TypeError) as error:  # it has called a function of the user's
+                if any(map(callable, every)):
+                    raise Untraceable(f"{_title(real)} is not known here") from error
+                raise
 
         return function
 

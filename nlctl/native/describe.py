@@ -71,7 +71,7 @@ def called(reading: Reading) -> Iterator[str]:
     for name, call in reading.equations.calls.items():
         how = SLOW if name in back else "in machine code of numba"
         how = how if made else "as it stands"
-        yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
+        yield f"{call.kind} of block '{call.block}', {how}: {call.why}"
 
 
 def described_functions(schedule: Schedule, cut: Iterable[tuple[int, str]]) -> tuple[str, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from numpy.polynomial import chebyshev, legendre
-from numpy.polynomial import polynomial as powers
 
 from ..arrays import traced
 from ..graph import Untraceable
@@ -19,16 +18,6 @@ def _terms(np_: Facade, x: Any, c: Any) -> tuple[Any, list[Any]]:
     if coefficients.ndim != 1 or not len(coefficients):
         raise Untraceable("coefficients of several polynomials")
     return traced(np_.graph, x), list(coefficients)
-
-
-@formula(powers.polyval)
-def _polyval(np_: Facade, x: Any, c: Any, tensor: bool = True) -> Any:
-    """Return the sum of c_i x^i."""
-    x, c = _terms(np_, x, c)
-    value = c[-1] + x * 0.0
-    for factor in c[-2::-1]:
-        value = factor + value * x
-    return value
 
 
 @formula(chebyshev.chebval)
