@@ -168,7 +168,7 @@ class Compiled(Reading, StandIn):
             If x or u has another length, or an override is refused.
         """
         g, m = (np.empty(self.lowered.rows[name]) for name in "gm")
-        return self._call(self.native[0], self.system.nstates, t, x, u, params, g, m)
+        return self._call(0, self.system.nstates, t, x, u, params, g, m)
 
     @as_annotated
     def output(
@@ -178,7 +178,7 @@ class Compiled(Reading, StandIn):
 
         Shapes: `x` (nstates,), `u` (ninputs,); returns (noutputs,).
         """
-        return self._call(self.native[1], self.system.noutputs, t, x, u, params)
+        return self._call(1, self.system.noutputs, t, x, u, params)
 
     @property
     def tangent(self) -> Tangent:
@@ -302,7 +302,7 @@ class Compiled(Reading, StandIn):
 
     def _call(
         self,
-        function: Rhs,
+        which: int,
         size: int | None,
         t: float,
         x: object,
@@ -323,7 +323,11 @@ class Compiled(Reading, StandIn):
                 )
         result = np.empty(size or 0)
         u = np.append(u, np.zeros(self.schedule.ninputs - u.size))  # inputs stand still
-        function(float(t), x, u, self.parameter_vector(params), result, *more)
+        self.native[which](float(t), x, u, self.parameter_vector(params), result, *more)
+        cut = self.equations.cut
+        if cut and np.isnan(result).any():  # a loop takes more passes than are written out
+            u = u[: self.system.ninputs or 0]
+            return self.calling(cut)._call(which, size, t, x, u, params, *more)
         return result
 
     def __repr__(self) -> str:

@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import optimize
-from scipy.integrate import solve_ivp
 
 import nlctl
 from nlctl import errors
@@ -159,95 +157,3 @@ def test_what_is_too_deep_for_a_formula_has_none():
     """And says so."""
     with pytest.raises(errors.CompileError, match="'s' has no formula: its expressions are nested"):
         nlctl.typeset(loop(alternating))
-
-
-def slow_fixed_point(t, x, u, params):
-    """y = cos(y) + x / 10 by small steps: hundreds of passes."""
-    y = 0.0
-    while abs(y - np.cos(y) - 0.1 * x[0]) > 1e-12:
-        y = y - 0.05 * (y - np.cos(y) - 0.1 * x[0])
-    return [-y]
-
-
-def flat_root(t, x, u, params):
-    """A root of order 3, which Brent's method nears slowly: more than a hundred passes."""
-    root = optimize.brentq(lambda y: (y - 0.1 * x[0]) ** 3, -1.0, 1.0, maxiter=500)
-    return [-root]
-
-
-BEYOND = {
-    "tolerance": (
-        slow_fixed_point,
-        lambda x: optimize.brentq(lambda y: y - np.cos(y) - 0.1 * x, 0, 2),
-    ),
-    "brentq": (flat_root, lambda x: 0.1 * x),
-}
-
-
-@pytest.mark.parametrize("name", BEYOND)
-def test_where_a_loop_takes_more_passes_than_are_written_out_its_function_is_called(name):
-    """In single runs and in members, in continuous and in discrete time; and it is said."""
-    function, root = BEYOND[name]
-    timepts, compiled = np.linspace(0.0, 1.0, 5), nlctl.compile(loop(function))
-    assert not compiled.equations.calls
-    assert "a run that takes more calls the update function of block 's'" in str(compiled)
-    response = nlctl.input_output_response(compiled, timepts, initial_state=1.0)
-    assert response.statistics.called == ("update function of block 's'",)
-    exact = solve_ivp(lambda t, x: -root(x[0]), (0, 1), [1.0], rtol=1e-11, atol=1e-12,
-                      t_eval=timepts)  # fmt: skip
-    assert response.states == pytest.approx(exact.y, abs=1e-7)
-    many = nlctl.ensemble_response(
-        compiled, timepts, initial_state=np.array([[1.0], [0.5]]), keep=["x"], threads=1
-    )
-    assert many.signals["x"][0] == pytest.approx(exact.y[0], abs=1e-7)
-    assert set(many.table["status"]) == {"OK"}
-
-
-def test_the_next_states_of_a_discrete_diagram_are_called_where_passes_do_not_suffice():
-    system = ct.nlsys(slow_fixed_point, None, inputs=0, outputs=1, states=1, dt=1.0, name="s")
-    response = nlctl.input_output_response(system, np.arange(4.0), initial_state=1.0)
-    states = [1.0]
-    for _ in range(3):
-        states += slow_fixed_point(0.0, states[-1:], None, {})
-    assert response.states[0] == pytest.approx(states, abs=1e-12)
-
-
-def quick_or_slow(t, x, u, params):
-    """Newton's method where x < 2, small steps beyond."""
-    y, step = 0.5 + 0.01 * np.tanh(x[0]), 1.0 if x[0] < 2 else 0.05
-    while abs(y - np.cos(y)) > 1e-12:
-        y = y - step * (y - np.cos(y)) / (1 + np.sin(y))
-    return [y]
-
-
-def test_only_members_that_take_more_passes_call_the_function():
-    """The others stay what they are alone."""
-    timepts, compiled = np.linspace(0.0, 0.5, 3), nlctl.compile(loop(quick_or_slow))
-    slope = optimize.brentq(lambda y: y - np.cos(y), 0, 1)
-    starts = [0.0, 1.9, 0.5]
-    for start in starts:
-        response = nlctl.input_output_response(compiled, timepts, initial_state=start)
-        crosses = start + 0.5 * slope > 2
-        assert bool(response.statistics.called) == crosses
-        assert response.states[0] == pytest.approx(start + slope * timepts, abs=1e-9)
-    many = nlctl.ensemble_response(
-        compiled, timepts, initial_state=np.array(starts)[:, None], keep=["x"], threads=1
-    )
-    wanted = np.array(starts)[:, None] + slope * timepts
-    assert many.signals["x"] == pytest.approx(wanted, abs=1e-9)
-
-
-def test_derivatives_of_runs_are_differences_where_passes_do_not_suffice():
-    """d(exp(-t/10) x0) / dx0."""
-    with pytest.warns(errors.InexactWarning):
-        made = nlctl.sensitivity_response(
-            loop(flat_root), [0.0, 1.0], initial_state=[1.0], with_respect_to=["s.x(0)"]
-        )
-    assert made["x", "s.x(0)"][-1] == pytest.approx(np.exp(-0.1), abs=1e-5)
-
-
-def test_a_stepper_says_which_loop_takes_more_passes():
-    stepper = nlctl.stepper(nlctl.compile(loop(slow_fixed_point)), 0.1)
-    stepper.reset([1.0])
-    with pytest.raises(errors.DivergedError, match="a loop in the update function of block 's'"):
-        stepper.step()
