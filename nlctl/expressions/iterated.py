@@ -1,9 +1,9 @@
 """Loops whose end depends on what is computed: Newton's method, halving, a tolerance.
 
 Each pass is written out, and what it assigns is chosen: the new value where the loop still runs,
-otherwise what there was.  Python ends each such loop; where more passes than `PASSES` would be
-needed, the result is NaN, and a run that ends there is refused.  Where a pass ends the values
-hardly differ, so that what only later passes ask for is not located.
+otherwise what there was.  Python ends each such loop; where more passes are needed than are
+written out, the result is NaN, and a run that ends there calls the function instead.  Where a pass
+ends the values hardly differ, so that what only later passes ask for is not located.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from .graph import Expr, Graph, Untraceable
 from .merged import call_instead, chosen, later, truth_test, truth_value
 from .operators import elementwise
 
-PASSES = 64  # that are written out of a loop that ends at a tolerance
-_LONG, _FEWEST = 2000, 16  # expressions of its passes after which there is no other, but so many
+WRITTEN_PASSES = 64  # that are written out of a loop that ends at a tolerance
+_LONG, _FEWEST = 1200, 16  # expressions of its passes after which there is no other, but so many
 _ALWAYS_NEW = (ast.Yield, ast.YieldFrom, ast.Await, ast.Try, ast.With, ast.Delete, ast.Global,
                ast.Nonlocal, ast.FunctionDef, ast.ClassDef, ast.Continue, ast.Match)  # fmt: skip
 _CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
@@ -285,7 +285,7 @@ class Loop:
             return True
         size = len(self.graph.nodes) - self.size
         is_large = size > _LONG and self.passes > _FEWEST
-        is_long = is_large or (is_endless and self.passes > PASSES)
+        is_long = is_large or (is_endless and self.passes > WRITTEN_PASSES)
         self.is_cut |= is_long
         return not is_long
 

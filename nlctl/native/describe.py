@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ..blocks import Block
-from ..expressions.iterated import PASSES
+from ..expressions.iterated import WRITTEN_PASSES
 from ..upstream.systems import System
 from ..wording import counted
 from .diagram.nodes import Node
@@ -48,7 +48,7 @@ def described(reading: Reading) -> str:
         lines.append(f"  solved for   {torn}")
     lines += [f"  as it stands {line}" for line in called(reading)]
     lines += [
-        f"  passes       at most {PASSES} of each loop are written out; "
+        f"  passes       at most {WRITTEN_PASSES} of each loop are written out; "
         f"a run that takes more calls the {name}"
         for name in described_functions(schedule, reading.equations.cut)
     ]

@@ -65,7 +65,7 @@ def trajectory(
     course: Course, x0: np.ndarray, p: np.ndarray, progress: Callable[[float], object] | None = None
 ) -> Trajectory:
     """Run one member; again, with functions called of which a loop takes too many passes."""
-    reached = integrated(course, x0, p, progress)
+    reached = run_once(course, x0, p, progress)
     return called_instead(course, reached, x0, p, progress) if reached.cut else reached
 
 
@@ -78,12 +78,12 @@ def called_instead(
 ) -> Trajectory:
     """Run one member again, with the functions called that have cut it short."""
     compiled, cut = course.compiled, cut_short.cut
-    again = integrated(replace(course, compiled=compiled.calling(cut)), x0, p, progress)
+    again = run_once(replace(course, compiled=compiled.calling(cut)), x0, p, progress)
     called = described_functions(compiled.schedule, cut)
     return replace(again, cut=cut, statistics=replace(again.statistics, called=called))
 
 
-def integrated(
+def run_once(
     course: Course, x0: np.ndarray, p: np.ndarray, progress: Callable[[float], object] | None = None
 ) -> Trajectory:
     """Run one member of one program.  Ctrl-C ends it with the status STOPPED."""

@@ -14,7 +14,7 @@ from ..errors import CompileError, InexactWarning
 from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
-from ..native.driver import Course, begin, integrated, prepared
+from ..native.driver import Course, begin, prepared, run_once
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
@@ -64,7 +64,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     span = float(run.times[0]), float(run.times[-1])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
-    reached = integrated(_course(differentiated, run, u), start, whole)
+    reached = run_once(_course(differentiated, run, u), start, whole)
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)

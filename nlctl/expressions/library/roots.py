@@ -48,7 +48,7 @@ def root_scalar(
         method = "brentq" if bracket is not None else by_tangents
     named = {"rtol": rtol, "maxiter": maxiter}
     named = {name: value for name, value in named.items() if value is not None}
-    if method in ("brentq", "bisect"):
+    if method in ("brentq", "bisect") and bracket is not None:
         named |= {} if xtol is None else {"xtol": xtol}
         search = brentq if method == "brentq" else bisect
         return Root(search(f, bracket[0], bracket[1], args, **named), method)

@@ -1,4 +1,4 @@
-"""What to do about a function that is called as it stands: how it would become expressions."""
+"""What to do about a function that is called unchanged: how it would become expressions."""
 
 from __future__ import annotations
 
