@@ -282,6 +282,9 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         return element(base) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
+    results = made.of_tuples(walk, name, given) if base.own else []
+    if results:  # what the call has made, and is no array, list or dict, is one of these
+        return least_upper_bound(results)
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
 
 
@@ -331,6 +334,14 @@ _WITHOUT_CODE = (
 )
 
 
+def iterates(walk: Walk, value: KnownValue) -> bool:
+    """Walk the method of somebody's class that goes through an object; return if there is one."""
+    method = made.operator_of(walk, value, "__iter__")
+    if method is not None:
+        walk.function(method, Given((value,)))
+    return method is not None
+
+
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
@@ -341,6 +352,8 @@ def check_object(value: KnownValue, what: str) -> None:
             check_object(choice, what)
         return
     if isinstance(thing, Instance):
+        if issubclass(thing.cls, tuple) and "__iter__" not in vars(thing.cls):
+            return
         raise Impure(f"{what} an object of type {thing.cls.__name__}", "use arrays")
     if isinstance(thing, tuple) and hasattr(thing, "_fields"):
         return
@@ -361,7 +374,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if operator is not None:
         return walk.function(operator, Given(places))
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
-        _check_parts(value, name)
+        if name not in _ITERATING or not iterates(walk, value):
+            _check_parts(value, name)
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
@@ -391,6 +405,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
 
 
 _OPERATORS = {"len": "__len__", "abs": "__abs__"}
+_ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter", "sum", "sorted",
+              "min", "max", "any", "all")  # fmt: skip
 _MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
 
 
