@@ -390,9 +390,12 @@ def compile(  # noqa: A001 (what it does)
     Functions are read before they are called.  One that remembers something outside of states,
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
 
-    A function that cannot be written out as expressions (it has a loop that the state ends, or a
-    quadrature) is called as it stands: as machine code that numba makes of it, otherwise
-    back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
+    A function that cannot be written out as expressions (it integrates an equation, or looks for
+    the nearest of points) is called as it stands: as machine code that numba makes of it, otherwise
+    back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which,
+    and what to do about it.  Loops that the state ends, searches for roots and quadratures are
+    written out for some passes; a run that takes more calls the function, and its statistics say
+    so.
 
     Examples
     --------

@@ -47,6 +47,7 @@ def test_where_a_loop_takes_more_passes_than_are_written_out_its_function_is_cal
     assert "a run that takes more calls the update function of block 's'" in str(compiled)
     response = nlctl.input_output_response(compiled, timepts, initial_state=1.0)
     assert response.statistics.called == ("update function of block 's'",)
+    assert "called   update function of block 's': a loop takes more passes" in str(response)
     exact = solve_ivp(lambda t, x: -root(x[0]), (0, 1), [1.0], rtol=1e-11, atol=1e-12,
                       t_eval=timepts)  # fmt: skip
     assert response.states == pytest.approx(exact.y, abs=1e-7)
