@@ -324,9 +324,8 @@ class Compiled(Reading, StandIn):
         result = np.empty(size or 0)
         u = np.append(u, np.zeros(self.schedule.ninputs - u.size))  # inputs stand still
         self.native[which](float(t), x, u, self.parameter_vector(params), result, *more)
-        cut = self.equations.cut
+        cut, u = self.equations.cut, u[: self.system.ninputs or 0]
         if cut and np.isnan(result).any():  # a loop takes more passes than are written out
-            u = u[: self.system.ninputs or 0]
             return self.calling(cut)._call(which, size, t, x, u, params, *more)
         return result
 
@@ -390,12 +389,10 @@ def compile(  # noqa: A001 (what it does)
     Functions are read before they are called.  One that remembers something outside of states,
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
 
-    A function that cannot be written out as expressions (it integrates an equation, or looks for
-    the nearest of points) is called as it stands: as machine code that numba makes of it, otherwise
-    back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which,
-    and what to do about it.  Loops that the state ends, searches for roots and quadratures are
-    written out for some passes; a run that takes more calls the function, and its statistics say
-    so.
+    A function that cannot be written out as expressions (it integrates an equation, say) is called
+    as it stands: as machine code that numba makes of it, otherwise back in Python, as slow as
+    python-control.  ``print(compiled)`` says which, and what to do about it.  So is one with a loop
+    that takes more passes in a run than are written out; its statistics say so.
 
     Examples
     --------

@@ -283,7 +283,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
     results = made.of_tuples(walk, name, given) if base.own else []
-    if results:  # what the call has made, and is no array, list or dict, is one of these
+    if results:  # only these have it, of all that a call can make
         return least_upper_bound(results)
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
 
