@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .evaluate import evaluate_expressions
+from .evaluate import evaluate_expressions, value_of
 from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
 
 _SIDES = {"sign": (1.0, -1.0), "heaviside": (1.0, 0.0)}  # values above 0 and below
 _POINTS = 256
-_TRUTHS = "truths"  # the array of values that say whether other conditions hold
 _NEAR = 0.1  # of a parameter
 _SAME = 1e-12
 
@@ -21,22 +20,25 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
     if condition.op not in (*ORDERS, *_SIDES, "copysign") or condition.size is not None:
         return False
     one, other = _compared(graph, condition)
-    on_it = {one: other} if one.varies else {other: one}
-    tied = [n for n in needed(roots) if _is_tied(graph, n, (one, other))]
-    there = {**on_it, **_free(graph, roots, tied, on_it, p)}
-    sides = [
-        replaced_parts(graph, roots, {**there, **_on_side(graph, tied, there, one, above)})
-        for above in (True, False)
-    ]
-    pairs = [pair for pair in zip(*sides, strict=True) if pair[0] is not pair[1]]
-    exprs = [expr for pair in pairs for expr in pair]
+    moved, place = (one, other) if one.varies else (other, one)
+    nodes = needed(roots)
+    tied = [n for n in nodes if _is_tied(graph, n, (one, other))]
+    asking = _made_of(nodes, set(tied))
     try:
-        values = evaluate_expressions(exprs, _at_random(exprs, p))
+        arrays = _at_random((*nodes, *needed([place])), p)
+        there = {moved: evaluate_expressions([place], arrays)[0]}
+        there |= _free(nodes, tied, there, (moved, place), arrays)
+        jumping = [root for root in dict.fromkeys(roots) if root in asking]
+        sides = [
+            _values(jumping, arrays, there, _on_side(graph, tied, one, above))
+            for above in (True, False)
+        ]
     except Untraceable:
         return False
-    apart = zip(values[::2], values[1::2], strict=True)
     with np.errstate(invalid="ignore"):  # what is infinite on both sides is not known to agree
-        return all(np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in apart)
+        return all(
+            np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in zip(*sides, strict=True)
+        )
 
 
 def _compared(graph: Graph, condition: Expr) -> tuple[Expr, Expr]:
@@ -54,68 +56,89 @@ def _is_tied(graph: Graph, node: Expr, numbers: tuple[Expr, Expr]) -> bool:
 
 
 def _on_side(
-    graph: Graph, tied: Sequence[Expr], there: Mapping[Expr, Expr], one: Expr, above: bool
-) -> dict[Expr, Expr]:
+    graph: Graph, tied: Sequence[Expr], one: Expr, above: bool
+) -> dict[Expr, bool | float]:
     """Return what conditions on the same two numbers are where `one` is above the other."""
-    values = {}
+    values: dict[Expr, bool | float] = {}
     for node in tied:
         larger = above == (_compared(graph, node)[0] is one)
-        if node.op == "copysign":
-            (given,) = replaced_parts(graph, node.args[:1], there)
-            size = graph.op("absolute", graph.number(given))
-            values[node] = size if larger else graph.op("neg", size)
-        elif node.op in _SIDES:
-            values[node] = graph.const(_SIDES[node.op][0 if larger else 1])
-        else:
-            values[node] = graph.const(larger == (node.op in ("gt", "ge")))
+        if node.op in ORDERS:
+            values[node] = larger == (node.op in ("gt", "ge"))
+        else:  # of copysign it is the sign
+            values[node] = _SIDES.get(node.op, _SIDES["sign"])[0 if larger else 1]
     return values
 
 
+_Arrays = Mapping[str, np.ndarray]
+
+
+def _values(
+    exprs: Sequence[Expr],
+    arrays: _Arrays,
+    instead: Mapping[Expr, np.ndarray],
+    sides: Mapping[Expr, bool | float],
+) -> list[np.ndarray]:
+    """Return the values of expressions, with other values or signs for some of their parts."""
+    values = dict(instead)
+    with np.errstate(all="ignore"):
+        for node in needed(exprs, instead.keys() | {n for n in sides if n.op != "copysign"}):
+            if node in sides:
+                side = np.asarray(sides[node])
+                values[node] = abs(values[node.args[0]]) * side if node.op == "copysign" else side
+            elif node not in values:
+                values[node] = value_of(node, [values[arg] for arg in node.args], arrays)
+    return [values[expr] for expr in exprs]
+
+
 def _free(
-    graph: Graph,
-    roots: Sequence[Expr],
+    nodes: Sequence[Expr],
     tied: Sequence[Expr],
-    on_it: Mapping[Expr, Expr],
-    p: np.ndarray,
-) -> dict[Expr, Expr]:
+    there: Mapping[Expr, np.ndarray],
+    pair: tuple[Expr, Expr],
+    arrays: dict[str, np.ndarray],
+) -> dict[Expr, np.ndarray]:
     """Return what stands for the other conditions: true or false, whatever they ask for."""
     # What is met only rarely would not be met by values at random. Only those that parameters alone
     # decide, where this condition switches, are what they are; unless they switch there, too.
-    others = [n for n in needed(roots) if n.op in COMPARISONS and n not in tied]
-    truths: dict[Expr, Expr] = {}
-    row = 0
-    placed = replaced_parts(graph, others, on_it)
-    moving = _moving(placed)
-    for node, there in zip(others, placed, strict=True):
-        if there in moving or _is_met(there, p):
-            where = (_TRUTHS, row, 1 if node.size else 0)
-            truth = graph.node("leaf", data=where, size=node.size, varies=True)
-            truths[node], row = graph.op("gt", truth, graph.const(0.0)), row + (node.size or 1)
-    return truths
-
-
-def _is_met(comparison: Expr, p: np.ndarray) -> bool:
-    """Return whether a comparison of parameters is of equal ones, whatever they are."""
-    if comparison.op not in ORDERS:
-        return False
-    a, b = evaluate_expressions(list(comparison.args), _at_random([comparison], p))
+    moved, place = pair
+    moving = _moving(nodes, moved, _moving(needed([place]))[place])
+    others = [n for n in nodes if n.op in COMPARISONS and n not in tied]
+    ordered = [n for n in others if not moving[n] and n.op in ORDERS]
+    numbers = [arg for comparison in ordered for arg in comparison.args]
+    values = _values(numbers, arrays, there, {})
     with np.errstate(invalid="ignore"):
-        return bool(np.all(abs(a - b) <= _SAME * (abs(a) + abs(b))))
+        met = {
+            n for n, a, b in zip(ordered, values[::2], values[1::2], strict=True)
+            if np.all(abs(a - b) <= _SAME * (abs(a) + abs(b)))
+        }  # fmt: skip
+    rng = np.random.default_rng(2)
+    free = [n for n in others if moving[n] or n in met]
+    return {n: rng.random((n.size, _POINTS) if n.size else _POINTS) < 0.5 for n in free}
 
 
-def _moving(exprs: Sequence[Expr]) -> set[Expr]:
-    """Return what depends on more than parameters."""
-    moving: set[Expr] = set()
-    for node in needed(exprs):
+def _made_of(nodes: Sequence[Expr], parts: set[Expr]) -> set[Expr]:
+    """Return which expressions, parts first, are among some or made of these."""
+    for node in nodes:
+        if not parts.isdisjoint(node.args):
+            parts.add(node)
+    return parts
+
+
+def _moving(
+    nodes: Sequence[Expr], moved: Expr | None = None, moves: bool = False
+) -> dict[Expr, bool]:
+    """Return which expressions depend on more than parameters; of one it is known."""
+    moving: dict[Expr, bool] = {}
+    for node in nodes:
         is_read = node.op == "leaf" and node.data[0] != "p"
-        if is_read or node.op in ("call", "solve") or any(a in moving for a in node.args):
-            moving.add(node)
+        is_moving = is_read or node.op in ("call", "solve") or any(moving[a] for a in node.args)
+        moving[node] = moves if node is moved else is_moving
     return moving
 
 
 def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
     """Return values for all that expressions read."""
-    rng, rows = np.random.default_rng(1), dict.fromkeys(("t", "x", "u", _TRUTHS), 1)
+    rng, rows = np.random.default_rng(1), dict.fromkeys(("t", "x", "u"), 1)
     for node in needed(exprs):
         if node.op == "leaf" and node.data[0] in rows:
             array, start, step = node.data

@@ -172,7 +172,7 @@ class Graph:
         # what is computed in passes of loops that may have ended, a set for each such loop
         self.passing: list[set[Expr]] = []
         self.of_passes: set[Expr] = set()  # what only later passes of such loops compute
-        self.is_cut = False  # whether Python may take more passes of a loop than are written out
+        self.is_cut = False  # whether Python may do more than is written out, and there is NaN
         self._known: dict[Any, Expr] = {}
         self._results: dict[tuple[Any, ...], Expr] = {}
 
@@ -197,6 +197,12 @@ class Graph:
             self.guards.append(condition)
         elif not self.decided(condition):
             raise catchable(error)
+
+    def limited(self, condition: Expr) -> None:
+        """Note where what is written out suffices: elsewhere the function is to be called."""
+        if condition.op != "const" or not condition.data:
+            self.is_cut = True
+            self.guards.append(condition)  # no error, which somebody might catch
 
     def assumed(self, integer: Expr) -> int:
         """Return the value of an integer; from now on the parameters behind it are fixed."""

@@ -1,9 +1,9 @@
 """Loops whose end depends on what is computed: Newton's method, halving, a tolerance.
 
 Each pass is written out, and what it assigns is chosen: the new value where the loop still runs,
-otherwise what there was.  Python ends each such loop; where more passes than `_MOST` would be
-needed, the result is NaN, and a run that ends there is refused.  Where a pass ends the values
-hardly differ, so that what only later passes ask for is not located.
+otherwise what there was.  Python ends each such loop; where more passes are needed than are
+written out, the result is NaN, and a run that ends there calls the function instead.  Where a pass
+ends the values hardly differ, so that what only later passes ask for is not located.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from .graph import Expr, Graph, Untraceable
 from .merged import call_instead, chosen, later, truth_test, truth_value
 from .operators import elementwise
 
-_MOST = 64  # of a loop that nothing else limits
+WRITTEN_PASSES = 64  # that are written out of a loop that ends at a tolerance
+_LONG, _FEWEST = 1200, 16  # expressions of its passes after which there is no other, but so many
 _ALWAYS_NEW = (ast.Yield, ast.YieldFrom, ast.Await, ast.Try, ast.With, ast.Delete, ast.Global,
                ast.Nonlocal, ast.FunctionDef, ast.ClassDef, ast.Continue, ast.Match)  # fmt: skip
 _CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
@@ -88,7 +89,8 @@ class PassWriter(ast.NodeTransformer):
             first = self._segment(name, [taken])
             if first is None:
                 return None
-            counted: list[ast.stmt] = [ast.Expr(call("next_pass"))]
+            over = ast.UnaryOp(ast.Not(), call("next_pass", ast.Constant(False)))
+            counted: list[ast.stmt] = [ast.If(over, [ast.Break()], [])]
             target = ast.Name(item, ast.Store())
             loop = ast.For(target, node.iter, self._tried(name, counted + first + body), [])
         begin = ast.Assign([ast.Name(name, ast.Store())], call_instead("loop"))
@@ -270,16 +272,22 @@ class Loop:
         self.copies: dict[str, Any] = {}
         self.others: dict[str, Any] = {}
         self.names: Sequence[str] = ()
-        self.guards = 0
+        self.guards, self.size, self.is_cut = 0, len(graph.nodes), False
 
-    def next_pass(self) -> bool:
-        """Count passes; there is none after too many of an unknown number."""
+    def next_pass(self, is_endless: bool = True) -> bool:
+        """Count passes; there is none after too many of a number that is not known."""
         self.passes += 1
         if self.passes == 1:
             self.graph.passing.append(self.first)
         elif self.passes == 2:
             self.graph.passing[-1] = self.later
-        return self.running.op == "const" or self.passes <= _MOST
+        if self.running.op == "const":
+            return True
+        size = len(self.graph.nodes) - self.size
+        is_large = size > _LONG and self.passes > _FEWEST
+        is_long = is_large or (is_endless and self.passes > WRITTEN_PASSES)
+        self.is_cut |= is_long
+        return not is_long
 
     def goes_on(self, test: Callable[[], Any]) -> bool:
         """Note the condition of another pass."""
@@ -340,9 +348,9 @@ class Loop:
         if self.passes:
             self.graph.passing.pop()
         self.graph.of_passes |= self.later - self.first
-        if self.passes > _MOST and self.running.op != "const":
-            self.graph.is_cut = True
-            self.fails()
+        if self.is_cut:
+            self.graph.limited(self.graph.op("not", self.running))
+            self.running = self.graph.const(False)
 
     def fails(self) -> None:
         """Note that Python raises an error, or would still be busy, where the loop runs."""

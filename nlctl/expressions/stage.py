@@ -130,6 +130,8 @@ class Stage:
             return value
         if isinstance(value, logging.Logger) or value is warnings.warn:
             return staged.Messages(value)
+        if value is warnings.simplefilter or value is warnings.filterwarnings:
+            return _without_warnings
         if isinstance(value, type):
             return self._type(value)
         if type(value) in (list, tuple):
@@ -150,7 +152,7 @@ class Stage:
     def _column(self, value: Any) -> Any:
         """Return a column of numbers of pandas: an array, and by labels its elements."""
         array = self.fresh(np.array(value, dtype=float))
-        if isinstance(array, Tracer) and value.index.is_unique:
+        if isinstance(array, Tracer) and hasattr(value, "index") and value.index.is_unique:
             array.labels = {k: i for i, k in enumerate(value.index) if isinstance(k, str)}
         return array
 
@@ -249,10 +251,9 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
-        if (getattr(real, "__module__", None) or "").startswith("scipy.optimize") and (
-            search := roots().get(real)
-        ):
-            return self.copied(search)
+        if (getattr(real, "__module__", None) or "").startswith("scipy.optimize"):
+            search = roots().get(real)
+            return self.for_numbers(real) if search is None else self.copied(search)
         if isinstance(real, np.ufunc):
             self._is_known(real)
             is_written = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
@@ -292,7 +293,12 @@ class Stage:
                 if written is None:
                     raise Untraceable(f"{_title(real)} is not known here")
                 return self._traced_library(real, written, arguments, options)
-            return self.fresh(real(*every, **named))
+            try:
+                return self.fresh(real(*every, **named))
+            except (Untraceable, TypeError) as error:  # it has called a function of the user's
+                if any(map(callable, every)):
+                    raise Untraceable(f"{_title(real)} is not known here") from error
+                raise
 
         return function
 
@@ -358,6 +364,8 @@ class Stage:
             return _errstate
         if cls is contextlib.suppress:
             return _suppress
+        if cls is warnings.catch_warnings:
+            return _without_warnings
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -420,6 +428,11 @@ def _errstate(**how: Any) -> Any:
     if not {"ignore", "warn", None}.issuperset(how.values()):
         raise Untraceable("NumPy's errors as errors of Python's")
     return np.errstate(**how)
+
+
+def _without_warnings(*_: object, **__: object) -> Any:
+    """Return a context in which nothing is said about warnings: expressions give none."""
+    return contextlib.nullcontext()
 
 
 def _suppress(*_: object) -> Any:

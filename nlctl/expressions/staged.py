@@ -179,6 +179,8 @@ def _forwarded(name: str) -> Callable[..., Any]:
             return iter([stage.instead(v) for v in real])
         if name == "__len__" and hasattr(real, "__len__"):
             return len(real)
+        if name == "__len__":  # as Python says; list() asks, and takes it for an answer
+            raise TypeError(f"object of type {type(real).__name__} has no len()")
         if name == "__getitem__" and hasattr(real, "__getitem__"):
             return stage.instead(real[settled(rest[0])])
         if name == "__bool__":

@@ -90,7 +90,8 @@ def _traced(
         raise
     except Exception as error:  # a traced function may raise whatever it likes
         graph.assumptions = assumptions
-        raise Untraceable(f"{error}{_place(error)}") from error
+        text = str(error) or f"an error of type {type(error).__name__}"
+        raise Untraceable(f"{text}{_place(error)}") from error
     finally:
         graph.decisions, graph.implied, graph.guards, graph.attempts = {}, {}, [], 0
         graph.limit = UNLIMITED

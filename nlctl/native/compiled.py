@@ -168,7 +168,7 @@ class Compiled(Reading, StandIn):
             If x or u has another length, or an override is refused.
         """
         g, m = (np.empty(self.lowered.rows[name]) for name in "gm")
-        return self._call(self.native[0], self.system.nstates, t, x, u, params, g, m)
+        return self._call(0, self.system.nstates, t, x, u, params, g, m)
 
     @as_annotated
     def output(
@@ -178,7 +178,7 @@ class Compiled(Reading, StandIn):
 
         Shapes: `x` (nstates,), `u` (ninputs,); returns (noutputs,).
         """
-        return self._call(self.native[1], self.system.noutputs, t, x, u, params)
+        return self._call(1, self.system.noutputs, t, x, u, params)
 
     @property
     def tangent(self) -> Tangent:
@@ -302,7 +302,7 @@ class Compiled(Reading, StandIn):
 
     def _call(
         self,
-        function: Rhs,
+        which: int,
         size: int | None,
         t: float,
         x: object,
@@ -323,7 +323,10 @@ class Compiled(Reading, StandIn):
                 )
         result = np.empty(size or 0)
         u = np.append(u, np.zeros(self.schedule.ninputs - u.size))  # inputs stand still
-        function(float(t), x, u, self.parameter_vector(params), result, *more)
+        self.native[which](float(t), x, u, self.parameter_vector(params), result, *more)
+        cut, u = self.equations.cut, u[: self.system.ninputs or 0]
+        if cut and np.isnan(result).any():  # a loop takes more passes than are written out
+            return self.calling(cut)._call(which, size, t, x, u, params, *more)
         return result
 
     def __repr__(self) -> str:
@@ -386,9 +389,10 @@ def compile(  # noqa: A001 (what it does)
     Functions are read before they are called.  One that remembers something outside of states,
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
 
-    A function that cannot be written out as expressions (it has a loop that the state ends, or a
-    quadrature) is called as it stands: as machine code that numba makes of it, otherwise
-    back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
+    A function that cannot be written out as expressions (it integrates an equation, say) is called
+    as it stands: as machine code that numba makes of it, otherwise back in Python, as slow as
+    python-control.  ``print(compiled)`` says which, and what to do about it.  So is one with a loop
+    that takes more passes in a run than are written out; its statistics say so.
 
     Examples
     --------

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import control as ct
 import numpy as np
 
 from ..blocks import Block
+from ..expressions.iterated import WRITTEN_PASSES
 from ..upstream.systems import System
 from ..wording import counted
 from .diagram.nodes import Node
 from .diagram.parameters import Slot
 from .diagram.program import Program, count_guards, count_switching_functions, memory
-from .diagram.schedule import signal_name
+from .diagram.schedule import Schedule, signal_name
 from .jacobians import inexact
 from .machine.evaluations import Machine
 from .reading import Reading
@@ -46,6 +47,11 @@ def described(reading: Reading) -> str:
         torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
     lines += [f"  as it stands {line}" for line in called(reading)]
+    lines += [
+        f"  passes       at most {WRITTEN_PASSES} of each loop are written out; "
+        f"a run that takes more calls the {name}"
+        for name in described_functions(schedule, reading.equations.cut)
+    ]
     for i in dict.fromkeys(schedule.order):
         lines += [f"  {nodes[i].path}: {_kind(nodes[i])}"]
         lines += [
@@ -65,7 +71,12 @@ def called(reading: Reading) -> Iterator[str]:
     for name, call in reading.equations.calls.items():
         how = SLOW if name in back else "in machine code of numba"
         how = how if made else "as it stands"
-        yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
+        yield f"{call.kind} of block '{call.block}', {how}: {call.why}"
+
+
+def described_functions(schedule: Schedule, cut: Iterable[tuple[int, str]]) -> tuple[str, ...]:
+    """Return in words functions that are known by their blocks' places and by their kinds."""
+    return tuple(f"{kind} function of block '{schedule.nodes[i].path}'" for i, kind in sorted(cut))
 
 
 def _conditions(reading: Reading) -> Iterator[str]:

@@ -11,10 +11,11 @@ import control as ct
 import numpy as np
 
 from ..delays.variation import Variation
-from ..errors import CompileError, ParameterError
+from ..errors import ParameterError
 from .along import derivatives
 from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from .compiled import Compiled
+from .describe import described_functions
 from .diagram.program import instants_of
 from .discrete import simulate_discrete
 from .happened import happened, with_log
@@ -63,7 +64,29 @@ class Course:
 def trajectory(
     course: Course, x0: np.ndarray, p: np.ndarray, progress: Callable[[float], object] | None = None
 ) -> Trajectory:
-    """Run one member.  Ctrl-C ends an integration with the status STOPPED."""
+    """Run one member; again, with functions called of which a loop takes too many passes."""
+    reached = run_once(course, x0, p, progress)
+    return called_instead(course, reached, x0, p, progress) if reached.cut else reached
+
+
+def called_instead(
+    course: Course,
+    cut_short: Trajectory,
+    x0: np.ndarray,
+    p: np.ndarray,
+    progress: Callable[[float], object] | None = None,
+) -> Trajectory:
+    """Run one member again, with the functions called that have cut it short."""
+    compiled, cut = course.compiled, cut_short.cut
+    again = run_once(replace(course, compiled=compiled.calling(cut)), x0, p, progress)
+    called = described_functions(compiled.schedule, cut)
+    return replace(again, cut=cut, statistics=replace(again.statistics, called=called))
+
+
+def run_once(
+    course: Course, x0: np.ndarray, p: np.ndarray, progress: Callable[[float], object] | None = None
+) -> Trajectory:
+    """Run one member of one program.  Ctrl-C ends it with the status STOPPED."""
     compiled, settings = course.compiled, course.settings
     if not ct.isctime(compiled.system):
         return _sampled(course, x0, p)
@@ -84,21 +107,9 @@ def trajectory(
         outputs = finish(run)
     reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
     reached = at_its_end(run, reached)
-    refuse_cut_loops(compiled, reached.statistics, bool(compiled.equations.graph.of_passes))
     if run.spare is not None:
         give_back(compiled.cache, run.spare)
     return reached
-
-
-def refuse_cut_loops(compiled: Compiled, reached: Statistics, is_cut: bool) -> None:
-    """Refuse a run that may have ended where a loop takes more passes than are written out."""
-    if is_cut and reached.status in (Status.DIVERGED, Status.STEP_TOO_SMALL):
-        raise CompileError(
-            f"'{compiled.system.name}' has a function with a loop that ends at a tolerance, and "
-            f"may take more passes near t = {reached.time:.6g} s than are written out in machine "
-            "code: bound them, as for _ in range(50) with a break does, or run it by "
-            "engine='python-control'"
-        )
 
 
 def _sampled(course: Course, x0: np.ndarray, p: np.ndarray) -> Trajectory:
@@ -118,7 +129,7 @@ def _sampled(course: Course, x0: np.ndarray, p: np.ndarray) -> Trajectory:
         states=states,
         statistics=run,
         inputs=inputs[:, :done],
-    )
+    ).cut_short(machine(course.compiled, p[:, None]).lowered.cut)
 
 
 def begin(run: Run) -> None:

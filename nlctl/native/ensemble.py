@@ -36,7 +36,7 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
-from .driver import Course, begin, finish, prepared, refuse_cut_loops, trajectory, watched
+from .driver import Course, begin, called_instead, finish, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike, SignalsByName
 from .happened import happened
 from .integrate.methods.tableau import Tableau
@@ -240,7 +240,7 @@ def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:
         time=run.time, states=run.states, inputs=run.inputs, p=p[:, 0], params=every.given(number),
         width=ENSEMBLE_WIDTH,
     )  # fmt: skip
-    compare(every.compiled, trial, wanted)
+    compare(every.compiled.calling(run.cut), trial, wanted)
 
 
 def _seen(
@@ -295,8 +295,8 @@ def _group(every: Members, numbers: range, course: Course, stop: Event) -> Itera
             yield trajectory(course, x0[:, j], p[:, j])
         else:
             member = replace(made(run, outputs, j), happened=happened(compiled, run, j))
-            refuse_cut_loops(compiled, member.statistics, compiled.equations.graph.is_cut)
-            yield member
+            cut = (course, member, x0[:, j], p[:, j])
+            yield called_instead(*cut) if member.cut else member
 
 
 def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Run, np.ndarray]:

@@ -136,7 +136,12 @@ def jacobian(
     u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
     u = np.append(u, np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
-    return differentiated_at(reading, made, columns, directions)
+    found, cut = differentiated_at(reading, made, columns, directions), reading.equations.cut
+    if cut and any(np.isnan(part).any() for part in found.values()):
+        calling = reading.calling(cut)  # a loop takes more passes there than are written out
+        tell_of_differences(calling)
+        return jacobian(calling, x0, u0, t, params, directions)
+    return found
 
 
 def check_assumed(reading: Reading, made: Tangent, p: np.ndarray) -> None:

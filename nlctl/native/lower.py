@@ -55,6 +55,8 @@ class Lowered:
     # program holds
     assumed: Mapping[int, int]
     conditions: Conditions = field(default_factory=Conditions)  # what it switches at
+    # functions in which a loop may take more passes than are written out: places of blocks, kinds
+    cut: frozenset[tuple[int, str]] = frozenset()
 
     @property
     def size(self) -> int:
@@ -156,7 +158,7 @@ def _lowered(
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
-        lanes=lanes, assumed=found.graph.assumptions, conditions=found.conditions,
+        lanes=lanes, assumed=found.graph.assumptions, conditions=found.conditions, cut=found.cut,
     )  # fmt: skip
 
 

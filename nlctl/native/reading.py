@@ -11,11 +11,11 @@ from __future__ import annotations
 import operator
 import threading
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 from types import BuiltinFunctionType, FunctionType, MethodType, NoneType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -61,6 +61,21 @@ class Reading:
     def lowered(self) -> Lowered:
         """The plan of a program for one member."""
         return lower(self.schedule, self.program, 1, self.equations)
+
+    def calling(self, cut: frozenset[tuple[int, str]]) -> Self:
+        """Return the diagram with functions, of blocks at these places, called as they stand."""
+        if not cut:
+            return self
+        read = self.schedule
+        nodes = tuple(
+            replace(node, called=node.called | {kind for place, kind in cut if place == i})
+            for i, node in enumerate(read.nodes)
+        )
+        return self.cache.found(
+            _Calling,
+            lambda known: known.cut == cut,
+            lambda: _Calling(cut=cut, reading=replace(self, schedule=replace(read, nodes=nodes))),
+        ).reading
 
     @cached_property
     def _captured(self) -> CapturedValues:
@@ -108,6 +123,14 @@ class Reading:
                 f"compiled and is {_short(other.now)} now: compile again, or make it a "
                 "parameter"
             )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Calling:
+    """A diagram that was read again, with some functions called."""
+
+    cut: frozenset[tuple[int, str]]
+    reading: Any
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,6 +19,7 @@ from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
 from .compiled import Compiled, with_watched
+from .describe import described_functions
 from .driver import Course, trajectory
 from .integrate.state import Status
 from .own_errors import own_error
@@ -58,6 +59,7 @@ def respond(
     check_numbers(watched, (float(grid[0]), x0, u[:, 0]), params)
     course = Course(compiled=compiled, times=grid, inputs=u, settings=settings)
     reached = trajectory(course, x0, p, progress)
+    compiled = compiled.calling(reached.cut)
     trial = Trial(
         time=reached.time, states=reached.states, inputs=reached.inputs, p=p, params=params, width=1
     )
@@ -162,10 +164,21 @@ def _message(
     }
     sentence = f"'{compiled.system.name}' {what[run.status]} t = {run.time:.6g} s"
     if run.status in (Status.DIVERGED, Status.STEP_TOO_SMALL):
-        return sentence + _grown(compiled, reached)
+        return sentence + _grown(compiled, reached) + _cut_short(compiled, reached)
     if run.jump is None:
         return sentence
     return f"{sentence}: {chattering_words(compiled, p, params, run.jump)}"
+
+
+def _cut_short(compiled: Compiled, reached: Trajectory) -> str:
+    """Say which loops may have ended a run that does not call their functions instead."""
+    if not reached.cut or reached.statistics.called:
+        return ""
+    names = ", ".join(described_functions(compiled.schedule, reached.cut))
+    return (
+        f", or a loop in the {names} takes more passes there than are written out: bound them, or "
+        "run it by nlctl.input_output_response, which calls such a function"
+    )
 
 
 def _grown(compiled: Compiled, reached: Trajectory) -> str:

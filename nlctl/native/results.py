@@ -32,6 +32,8 @@ class Statistics:
     opaque: bool = False  # Whether a function was called unchanged: its conditions are not known.
     # Steps that were ended where a memory turns or jumps, and nothing else happens: no events.
     turns: int = 0
+    # Functions that were called, not written out, since a loop in them took too many passes.
+    called: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,14 @@ class Trajectory:
     culprit: int = -1  # the guard that has fallen last, or has ended it
     guard: float = 0.0  # and its value
     since: float = np.nan  # time of the first of the jumps that have ended it
+    # functions, by their blocks' places and kinds, of which a loop may have ended it that takes
+    # more passes than are written out, or that were called for that
+    cut: frozenset[tuple[int, str]] = frozenset()
+
+    def cut_short(self, cut: frozenset[tuple[int, str]]) -> Trajectory:
+        """Return it with the functions of which a loop may have ended it, if one may."""
+        ended = self.statistics.status in (Status.DIVERGED, Status.STEP_TOO_SMALL)
+        return replace(self, cut=cut) if ended else self
 
 
 def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
@@ -84,7 +94,7 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
         if lane["culprit"] >= 0
         else 0.0,
-    )
+    ).cut_short(run.machine.lowered.cut)
 
 
 def _every_input(run: Any, j: int, done: int) -> np.ndarray:

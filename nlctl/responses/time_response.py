@@ -166,6 +166,9 @@ class Response(ct.TimeResponseData):
             )
             turns = f", {counted(run.turns, 'turn')} of memories" if run.turns else ""
             lines.append(f"  run      {run.status.name}, {steps}{turns}")
+            if run.called:
+                names = ", ".join(run.called)
+                lines.append(f"  called   {names}: a loop takes more passes than are written out")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

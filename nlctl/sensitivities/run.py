@@ -14,7 +14,7 @@ from ..errors import CompileError, InexactWarning
 from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
-from ..native.driver import Course, begin, prepared, trajectory
+from ..native.driver import Course, begin, prepared, run_once
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
@@ -50,6 +50,9 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
             f"'{compiled.system.name}' is in discrete time: derivatives of runs are for diagrams "
             "in continuous time; nlctl.sampled has blocks with a clock in these"
         )
+    cut = compiled.equations.cut
+    if cut and _alone(compiled, run).statistics.called:  # it takes more passes than are written out
+        compiled = compiled.calling(cut)
     signals = observed_signals(compiled, run.of)
     quantities = varied_quantities(compiled, run.with_respect_to)
     u = input_array(compiled.system, run.inputs, run.times)
@@ -61,17 +64,22 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     span = float(run.times[0]), float(run.times[-1])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
-    integrated = trajectory(_course(differentiated, run, u), start, whole)
-    _audit(compiled, integrated, p, run)
-    if integrated.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
-        respond(
-            compiled, run.times, run.inputs, run.initial_state, settings=run.settings,
-            params=run.params, audit=False,
-        )  # fmt: skip
+    reached = run_once(_course(differentiated, run, u), start, whole)
+    _audit(compiled, reached, p, run)
+    if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
+        _alone(compiled, run)
     names = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
-    lacks = missing(differentiated, (compiled, names), integrated, given, beginning)
-    return _response(differentiated, (signals, quantities), (run.times, integrated), scale, lacks)
+    lacks = missing(differentiated, (compiled, names), reached, given, beginning)
+    return _response(differentiated, (signals, quantities), (run.times, reached), scale, lacks)
+
+
+def _alone(compiled: Compiled, run: RunWithDerivatives) -> Any:
+    """Run a diagram without derivatives; raise why that does not reach its end."""
+    return respond(
+        compiled, run.times, run.inputs, run.initial_state, settings=run.settings,
+        params=run.params, audit=False,
+    )  # fmt: skip
 
 
 def _compiled(

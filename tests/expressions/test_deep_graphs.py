@@ -157,24 +157,3 @@ def test_what_is_too_deep_for_a_formula_has_none():
     """And says so."""
     with pytest.raises(errors.CompileError, match="'s' has no formula: its expressions are nested"):
         nlctl.typeset(loop(alternating))
-
-
-def slow_fixed_point(t, x, u, params):
-    """y = cos(y) + x / 10 by small steps: hundreds of passes."""
-    y = 0.0
-    while abs(y - np.cos(y) - 0.1 * x[0]) > 1e-12:
-        y = y - 0.05 * (y - np.cos(y) - 0.1 * x[0])
-    return [-y]
-
-
-def test_a_loop_of_more_passes_than_are_written_out_is_no_diverged_run():
-    """Python-control takes over, with its own numbers; members of an ensemble are refused."""
-    timepts, system = np.linspace(0.0, 1.0, 5), loop(slow_fixed_point)
-    with pytest.warns(errors.EngineWarning, match="a loop that ends at a tolerance"):
-        response = nlctl.input_output_response(system, timepts, initial_state=1.0)
-    reference = ct.input_output_response(
-        system, timepts, 0.0, 1.0, solve_ivp_kwargs={"rtol": 1e-10, "atol": 1e-12}
-    )
-    assert response.states == pytest.approx(reference.states, abs=1e-6)
-    with pytest.raises(errors.CompileError, match="may take more passes"):
-        nlctl.ensemble_response(system, timepts, initial_state=np.array([[1.0], [0.5]]))

@@ -2,14 +2,14 @@
 
 import control as ct
 import numpy as np
-from scipy.integrate import quad
+from scipy.integrate import quad_vec
 
 import nlctl
 from nlctl.native.along import derivatives
 
 
 def update(t, x, u, p):
-    return [-p["a"] * x[0] + quad(lambda s: np.cos(s * x[0]), 0, 1)[0]]
+    return [-p["a"] * x[0] + quad_vec(lambda s: np.cos(s * x[0]), 0, 1)[0]]
 
 
 def test_one_result():

@@ -300,10 +300,10 @@ def test_diverged_run():
 
 def test_opaque_function():
     """A function that is called as it stands has differences, and a warning that says so."""
-    from scipy.integrate import quad
+    from scipy.integrate import quad_vec
 
     def update(t, x, u, p):
-        return [-p["a"] * x[0] + quad(lambda s: np.cos(s * x[0]), 0, 1)[0]]
+        return [-p["a"] * x[0] + quad_vec(lambda s: np.cos(s * x[0]), 0, 1)[0]]
 
     plant = ct.nlsys(
         update, lambda t, x, u, p: x, inputs=0, outputs=["x"], states=["x"], params={"a": 1.0},

@@ -72,8 +72,12 @@ class ComplexPair(Computed):
         self.real[key], self.imag[key] = value.real, value.imag
 
     def __pow__(self, exponent: object) -> ComplexPair:
+        if isinstance(exponent, float) and exponent > 0.0:
+            size = elementwise(self.graph, "power", _absolute(self.graph, self), exponent)
+            angle = elementwise(self.graph, "mul", _angle(self.graph, self), exponent)
+            return rect(self.graph, size, angle)
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
-            raise Untraceable("a power of complex numbers that is not a small integer")
+            raise Untraceable("a power of complex numbers by something else than a number above 0")
         unity = paired(self.graph, 1.0)
         return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), unity)
 
@@ -236,6 +240,7 @@ enter([complex], complex_number)
 enter([cmath.rect], rect)
 enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))
 enter([cmath.log], lambda graph, z: _log(graph, paired(graph, z)))
+enter([cmath.sqrt], lambda graph, z: _sqrt(graph, paired(graph, z)))
 enter([cmath.phase], lambda graph, z: _angle(graph, paired(graph, z)))
 enter(
     [cmath.polar],

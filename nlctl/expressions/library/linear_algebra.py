@@ -15,6 +15,7 @@ from ..elimination import eliminated, is_zero, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
+from .complex_numbers import ComplexPair, holds_complex, paired
 from .table import WRITTEN, Facade, constant_value, of
 
 __all__: list[str] = []
@@ -181,6 +182,8 @@ def _of_each(written: Callable[..., Any]) -> Any:
 
     @functools.wraps(written)
     def function(graph: Graph, a: Arithmetic, *rest: object) -> Any:
+        if holds_complex([a, *rest]):
+            return written(graph, a, *rest)
         a, others = traced(graph, a), [traced(graph, b) for b in rest]
         if a.ndim < 3:
             return written(graph, a, *others)
@@ -192,17 +195,60 @@ def _of_each(written: Callable[..., Any]) -> Any:
     return function
 
 
+def _paired_rows(graph: Graph, matrix: object) -> Tracer:
+    """Return the matrix of twice as many real equations that stands for one of complex numbers."""
+    z, np_ = paired(graph, matrix), Facade(graph)
+    return np_.block([[z.real, -z.imag], [z.imag, z.real]])
+
+
+def _solved_pairs(graph: Graph, a: object, b: object) -> ComplexPair:
+    """Return the solution of linear equations of complex numbers."""
+    right = paired(graph, b)
+    parts = Facade(graph).concatenate([right.real, right.imag])
+    solution = solved(graph, _paired_rows(graph, a), parts)
+    return ComplexPair(graph, solution[: len(right)], solution[len(right) :])
+
+
+@of(np.linalg.svd)
+def svd(graph: Graph, a: object, full_matrices: bool = True, compute_uv: bool = True) -> Tracer:
+    """Return the singular values of a matrix of two rows and columns, the larger one first."""
+    rows = _square(graph, a)
+    if compute_uv or len(rows) != 2:
+        raise Untraceable("singular vectors, or values of a matrix of more than two rows")
+    (p, q), (r, s) = rows
+    half, np_ = 0.5, Facade(graph)
+    one, other = np_.hypot(p + s, r - q) * half, np_.hypot(p - s, r + q) * half
+    return traced(graph, [one + other, np_.abs(one - other)])
+
+
+def of_bands(
+    graph: Graph, l_and_u: tuple[int, int], ab: object, b: object, **how: object
+) -> Tracer:
+    """Return the solution of equations whose matrix is given by its diagonals."""
+    below, above = l_and_u
+    bands = _rows(graph, ab)
+    n = len(bands[0])
+    whole = [
+        [bands[above + i - j][j] if -above <= i - j <= below else 0.0 for j in range(n)]
+        for i in range(n)
+    ]
+    return solved(graph, whole, b)
+
+
 @of(np.linalg.solve)
 @_of_each
-def _solve(graph: Graph, a: object, b: object) -> Tracer:
+def _solve(graph: Graph, a: object, b: object) -> Any:
     """Return the solution of linear equations."""
-    return solved(graph, a, b)
+    is_complex = holds_complex(a) or holds_complex(b)
+    return _solved_pairs(graph, a, b) if is_complex else solved(graph, a, b)
 
 
 @of(np.linalg.inv)
 @_of_each
-def inv(graph: Graph, a: object) -> Tracer:
+def inv(graph: Graph, a: object) -> Any:
     """Return the inverse of a matrix."""
+    if holds_complex(a):
+        return _solved_pairs(graph, a, np.eye(len(paired(graph, a))))
     n = len(traced(graph, a))
     return solved(graph, a, np.eye(n))
 

@@ -97,7 +97,7 @@ of(np.nanmin)(_extreme("minimum", ignores_nan=True))
 @of(np.sum)
 def sum_along(
     graph: Graph, values: object, axis: Axis = None, dtype: object = None, *,
-    keepdims: bool = False, where: object = True, initial: object = None,
+    keepdims: bool = False, where: object = True, initial: object = None, out: None = None,
 ) -> Any:  # fmt: skip
     """Return a sum."""
     if isinstance(values, Masked | ComplexPair):
@@ -105,7 +105,7 @@ def sum_along(
     array = traced(graph, values)
     if where is not True:
         array = elementwise(graph, "select", where, array, 0.0)
-    if dtype not in (None, float) or initial is not None:
+    if dtype not in (None, float) or initial is not None or out is not None:
         raise Untraceable("a sum with other arguments")
     if isinstance(axis, tuple) or keepdims:
         axes = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-_PASSES = 30  # that are written out of Brent's method: it takes 5 to 12
+from ..graph import Untraceable
 
 
 @functools.cache
@@ -22,7 +22,42 @@ def roots() -> dict[Any, Callable[..., Any]]:
     """Return what stands for functions of SciPy."""
     from scipy import optimize
 
-    return {optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton}
+    return {
+        optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton,
+        optimize.root_scalar: root_scalar,
+    }  # fmt: skip
+
+
+class Root:
+    """What `scipy.optimize.root_scalar` returns where it has found a root."""
+
+    def __init__(self, root: Any, method: str) -> None:
+        self.root, self.method, self.converged, self.flag = root, method, True, "converged"
+
+    def __getattr__(self, name: str) -> Any:
+        raise Untraceable(f"{name} of a root: how many passes it has taken")
+
+
+def root_scalar(
+    f, args=(), method=None, bracket=None, fprime=None, x0=None, x1=None, xtol=None, rtol=None,
+    maxiter=None,
+):  # fmt: skip
+    """Return a root by the method that is named, or for which there is what it needs."""
+    if method is None:
+        by_tangents = "newton" if callable(fprime) else "secant" if x1 is not None else None
+        method = "brentq" if bracket is not None else by_tangents
+    named = {"rtol": rtol, "maxiter": maxiter}
+    named = {name: value for name, value in named.items() if value is not None}
+    if method in ("brentq", "bisect") and bracket is not None:
+        named |= {} if xtol is None else {"xtol": xtol}
+        search = brentq if method == "brentq" else bisect
+        return Root(search(f, bracket[0], bracket[1], args, **named), method)
+    named |= {} if xtol is None else {"tol": xtol}
+    if method == "newton" and callable(fprime):
+        return Root(newton(f, x0, fprime, args, **named), method)
+    if method == "secant":
+        return Root(newton(f, x0, None, args, x1=x1, **named), method)
+    raise Untraceable(f"scipy.optimize.root_scalar by {method or 'differences'}")
 
 
 def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
@@ -35,7 +70,7 @@ def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
     xblk, fblk, spre, scur = xpre, fpre, xcur - xpre, xcur - xpre
     stop = (fpre == 0) | (fcur == 0)
     xcur = np.where(fpre == 0, xpre, xcur)
-    for _ in range(min(maxiter, _PASSES)):
+    for _ in range(maxiter):
         if stop:
             return xcur
         if fpre * fcur < 0:
@@ -78,13 +113,16 @@ def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
     raise RuntimeError("Failed to converge")
 
 
-def newton(func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, rtol=0.0):
+def newton(func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, rtol=0.0, x1=None):
     """Return a root near a place, by Newton's method or that of secants."""
     if fprime is not None:
         return _tangents(func, np.multiply(1.0, x0), fprime, args, tol, maxiter, rtol)
     p0 = np.multiply(1.0, x0)
-    p1 = p0 * (1 + 1e-4)
-    p1 = np.where(p1 >= 0, p1 + 1e-4, p1 - 1e-4)
+    if x1 is None:
+        p1 = p0 * (1 + 1e-4)
+        p1 = np.where(p1 >= 0, p1 + 1e-4, p1 - 1e-4)
+    else:
+        p1 = np.multiply(1.0, x1)
     return _secants(func, p0, p1, args, tol, maxiter, rtol)
 
 

@@ -23,7 +23,7 @@ _MOVING = (
     np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
     np.fliplr, np.flipud, np.rot90, np.diagonal, np.diag, np.diagflat, np.broadcast_to,
     np.broadcast_arrays, np.stack, np.vstack, np.column_stack, np.dstack, np.tile,
-    np.repeat, np.take, np.insert, np.delete, np.tril, np.triu, np.resize,
+    np.repeat, np.insert, np.delete, np.tril, np.triu, np.resize,
     np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
 )  # fmt: skip
 # functions that add and multiply
@@ -79,6 +79,16 @@ def _closed(graph: Graph, value: Any, long: Tracer | None) -> Any:
             value
         )
     return Tracer(graph, value) if long is None else long._part(value, None, 1)
+
+
+@of(np.take)
+def _take(graph: Graph, a: object, indices: object, axis: Any = None, **options: object) -> Any:
+    """Return elements at places, which the state may decide."""
+    array = traced(graph, a)
+    places = indices if isinstance(indices, Tracer) else traced(graph, indices)
+    if array.ndim == 1 and not options and any(e.op != "const" for e in places.values.flat):
+        return array[places]
+    return by_moving(np.take)(graph, a, indices, axis, **options)
 
 
 for _function in _MOVING:

@@ -12,10 +12,12 @@ from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
+from .complex_numbers import ComplexPair
 from .creation import whole_numbers
 from .exponential import expm
 from .gamma import gamma, loggamma_of_size
-from .linear_algebra import cholesky_factor, of_cholesky, of_triangle, of_triangles
+from .integrals import fixed_quad, quad
+from .linear_algebra import cholesky_factor, of_bands, of_cholesky, of_triangle, of_triangles
 from .python import guard_whole
 from .reductions import prod, sum_along
 from .shapes import by_moving
@@ -38,12 +40,16 @@ def enter_scipy() -> None:
     for name, solution in (("cho_solve", of_cholesky), ("lu_solve", of_triangles)):
         enter([getattr(linalg, name)], solution)
     enter([linalg.solve_triangular], of_triangle)
+    enter([linalg.solve_banded], of_bands)
     enter([linalg.expm], expm)
     for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size)):
         formula(getattr(special, name))(of_gamma)
     enter([linalg.cho_factor], cholesky_factor)
     for name, formula_of in _FORMULAS.items():
         formula(getattr(special, name))(formula_of)
+    of(integrate.quad, makes=True)(quad)
+    of(integrate.fixed_quad, makes=True)(fixed_quad)
+    formula(special.lambertw)(lambertw)
     for name in ("erf", "erfc"):
         enter([getattr(special, name)], functools.partial(_elementwise, name))
     for name in ("log1p", "expm1", "exp2", "cbrt"):
@@ -104,6 +110,33 @@ _HOW = ("assume_a", "check_finite", "overwrite_a", "overwrite_b")  # how, not wh
 
 def _elementwise(name: str, graph: Graph, x: object) -> Tracer:
     return elementwise(graph, name, x)
+
+
+_NEAR_TURN = -0.36  # of the function that w e^w is, at -1/e
+
+
+def lambertw(np: Facade, z: Any, k: object = 0, tol: object = 1e-8) -> ComplexPair:
+    """w with w e^w = z, of real z, by Halley's method; near -1/e and below it is called.
+
+    Source: R. M. Corless et al., On the Lambert W function, Adv. Comput. Math. 5 (1996) 329-359.
+    """
+    if k != 0 or isinstance(z, ComplexPair):
+        raise Untraceable("another branch of the Lambert W function, or of complex numbers")
+    z = traced(np.graph, z)
+    for place in z.elements().flat:
+        np.graph.limited(np.graph.op("gt", place, np.graph.const(_NEAR_TURN)))
+    bounded = np.clip(z, _NEAR_TURN, 1.5)
+    turn = np.sqrt(2.0 * (math.e * bounded + 1.0))
+    near = -1.0 + turn * (1.0 + turn * (-1.0 / 3.0 + turn * (11.0 / 72.0)))
+    large = np.log(np.maximum(z, 1.5))
+    far = np.where(z > 3.0, large - np.log(np.maximum(large, 1.0)), np.log1p(np.maximum(z, 0.0)))
+    w = np.where(z < 0.0, near, far)
+    for _ in range(6):
+        e = np.exp(-1.0 * w)  # not e^w, which may be infinite
+        rest = w - z * e
+        w = w - rest / (w + 1.0 - (w + 2.0) * rest / (2.0 * w + 2.0))
+    w = np.where(z == math.inf, math.inf, w)
+    return ComplexPair(np.graph, w, w * 0.0)
 
 
 def softmax(np: Facade, x: object, axis: object = None) -> Any:

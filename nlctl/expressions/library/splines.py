@@ -174,6 +174,8 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
     elif hasattr(interpolant, "_spline"):
         spline = _of_one_value(interpolant._spline)
         rule = lambda e: b_spline(graph, spline, scalar(graph, e), 0, True).only  # noqa: E731
+    elif kind in _STEPS:
+        rule = functools.partial(_step, graph, interpolant, values, kind)
     else:
         raise Untraceable(f"interp1d of kind {kind!r}")
     extrapolates, bounded = bool(interpolant._extrapolate), bool(interpolant.bounds_error)
@@ -189,6 +191,21 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
         return _beyond(graph, e, ends, value, below, above)
 
     return _elementwise(graph, x, at)
+
+
+_STEPS = ("nearest", "nearest-up", "previous", "next")
+
+
+def _step(graph: Graph, interpolant: Any, values: np.ndarray, kind: str, x: Expr) -> Expr:
+    """Return the value of the place that is nearest to x, before it or behind it."""
+    places = np.asarray(interpolant.x, dtype=float)
+    middles = places[1:] / 2.0 + places[:-1] / 2.0  # rounded as SciPy does
+    bounds = {"previous": places[1:], "next": np.nextafter(places[:-1], np.inf)}.get(kind, middles)
+    if kind == "nearest":  # of two that are equally near the first
+        bounds = np.nextafter(bounds, np.inf)
+    pieces = [graph.const(float(value)) for value in values]
+    chosen = interval_choice(graph, x, list(bounds), pieces)
+    return graph.op("select", graph.op("eq", x, x), chosen, graph.const(np.nan))
 
 
 def _of_one_value(spline: Any) -> Any:

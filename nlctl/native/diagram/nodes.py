@@ -26,6 +26,7 @@ class Node:
     # why numba would compute its functions differently: they are traced, or called in Python
     numba_differs: tuple[str, ...] = ()
     messages: tuple[Message, ...] = ()  # that its functions write: they are traced or refused
+    called: frozenset[str] = frozenset()  # kinds of its functions that are not to be traced
     # what samples the block, whose states are the first ones of this
     sampled: Sampled | None = None
 

@@ -48,6 +48,9 @@ class Equations:
     fixed_points: dict[str, list[Expr]]
     # what the equations switch at, and no block declares
     conditions: Conditions = field(default_factory=Conditions)
+    # functions in which a loop may take more passes than are written out, and is NaN then: places
+    # of their blocks, and kinds
+    cut: frozenset[tuple[int, str]] = frozenset()
 
     def pieces(self, name: str) -> list[tuple[Expr, int]]:
         """Return the expressions of some results, row by row, each with its length."""
@@ -103,7 +106,7 @@ def equations(
             results |= then.all_known({f"sample{k}": _next(then)})
     return Equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
-        fixed_points=reader.fixed_points, conditions=switches,
+        fixed_points=reader.fixed_points, conditions=switches, cut=frozenset(reader.cut),
     )  # fmt: skip
 
 

@@ -27,6 +27,8 @@ from ..diagram.schedule import AlgebraicLoop, Combination, Schedule, Signal, sig
 from ..diagram.trace import feedthrough, time, traced_parameters
 from ..opaque.called import Call, call_of
 
+BEYOND = "a loop in it takes more passes than are written out"
+
 
 def _labels(blocks: Sequence[Node]) -> list[str]:
     """Return what names begin with; numbers are added unless all are different."""
@@ -53,6 +55,8 @@ class Reader:
     calls: dict[str, Call] = field(default_factory=dict)
     solvers: dict[str, Solver] = field(default_factory=dict)
     fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
+    # places and kinds of functions in which a loop may take more passes than are written out
+    cut: set[tuple[int, str]] = field(default_factory=set)
     what: Happening = frozenset()  # what happens to sampled blocks
     # where in the layout the parameters of a sampling are, by its identity
     samplings: Mapping[int, int] = field(default_factory=dict)
@@ -291,11 +295,14 @@ class Reader:
     ) -> Tracer:
         """Return the results of a block's functions, traced if possible."""
         node = self.blocks[i]
+        if kind in node.called:
+            return self._called(i, kind, functions, inputs, count, BEYOND)
 
         def arguments() -> tuple[Any, ...]:
             given = traced_parameters(self.graph, node.system, self.layout[i], self.p)
             return time(self.graph), self._states(node), inputs.copy(), given
 
+        self.graph.is_cut = False
         try:
             parts = [trace(self.graph, function, arguments) for function in functions]
             result = concatenated(self.graph, parts)
@@ -308,6 +315,8 @@ class Reader:
                 f"block '{node.path}' cannot be compiled: its {kind} function {error}; "
                 "the diagram still runs in python-control"
             ) from None
+        if self.graph.is_cut:
+            self.cut.add((i, kind))
         return result
 
     def _called(

@@ -127,7 +127,7 @@ def _hint(reading: Reading, code: Machine) -> None:
         _LOG.warning(
             "hint: the %s function of block '%s' is called back in Python, so runs are no faster "
             "than python-control's: %s",
-            call.kind, call.block, call.reason,
+            call.kind, call.block, call.why,
         )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ from ..purity.dicts import (
     unpacked_arguments,
 )
 from ..purity.objects import frozen
+from .remedies import remedy_of
 
 TAUGHT = (dicts,)  # modules that teach numba what functions of others use
 
@@ -69,6 +70,11 @@ class Call:
     # makes the `Source` of ``name(given, y)`` for numba; None where numba would understand it in
     # another way
     source: Callable[[], Source] | None
+
+    @property
+    def why(self) -> str:
+        """Why it could not be traced, and what to do about that."""
+        return f"{self.reason}; {remedy_of(self.reason)}"
 
     @property
     def given(self) -> int:

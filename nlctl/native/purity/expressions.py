@@ -35,9 +35,9 @@ from .values import (
     RowOf,
     Unknown,
     captured,
+    choice_among,
     element,
     forgotten,
-    function_choice,
     handed_out_again,
     holder,
     least_upper_bound,
@@ -293,7 +293,7 @@ class Expressions(ast.NodeVisitor):
             return self.walk.function(getter, Given((base, *values[:1])))
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
-            return replace(element(base), known=function_choice(map(captured, parts)))
+            return replace(element(base), known=choice_among(parts))
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
@@ -427,7 +427,8 @@ class Expressions(ast.NodeVisitor):
         return held
 
     def iterated(self, value: KnownValue) -> None:
-        if not isinstance(value.known, ListOf):  # whatever is in it is only handed on
+        # whatever is in a list is only handed on
+        if not isinstance(value.known, ListOf) and not known_calls.iterates(self.walk, value):
             known_calls.check_object(value, "goes through")
 
 

@@ -119,7 +119,9 @@ def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
         return handed_out_again(walk.call(wrapped, given))
-    if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
+    if thing in (np.errstate, warnings.catch_warnings) or (
+        isinstance(thing, type) and issubclass(thing, BaseException)
+    ):
         return FRESH
     owner = getattr(thing, "__self__", None)
     if _is_builtin(thing):
@@ -280,6 +282,9 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         return element(base) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
+    results = made.of_tuples(walk, name, given) if base.own else []
+    if results:  # only these have it, of all that a call can make
+        return least_upper_bound(results)
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
 
 
@@ -329,6 +334,14 @@ _WITHOUT_CODE = (
 )
 
 
+def iterates(walk: Walk, value: KnownValue) -> bool:
+    """Walk the method of somebody's class that goes through an object; return if there is one."""
+    method = made.operator_of(walk, value, "__iter__")
+    if method is not None:
+        walk.function(method, Given((value,)))
+    return method is not None
+
+
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
@@ -339,6 +352,8 @@ def check_object(value: KnownValue, what: str) -> None:
             check_object(choice, what)
         return
     if isinstance(thing, Instance):
+        if issubclass(thing.cls, tuple) and "__iter__" not in vars(thing.cls):
+            return
         raise Impure(f"{what} an object of type {thing.cls.__name__}", "use arrays")
     if isinstance(thing, tuple) and hasattr(thing, "_fields"):
         return
@@ -359,7 +374,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if operator is not None:
         return walk.function(operator, Given(places))
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
-        _check_parts(value, name)
+        if name not in _ITERATING or not iterates(walk, value):
+            _check_parts(value, name)
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
@@ -389,6 +405,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
 
 
 _OPERATORS = {"len": "__len__", "abs": "__abs__"}
+_ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter", "sum", "sorted",
+              "min", "max", "any", "all")  # fmt: skip
 _MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
 
 

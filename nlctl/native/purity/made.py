@@ -93,10 +93,7 @@ def walk_tuple(walk: Walk, cls: type) -> None:
     if cls in walk.tuples:
         return
     walk.tuples.add(cls)
-    new = Instance(cls)
-    for name in cls._fields:
-        new.learn(name, OUTSIDE)
-    value = KnownValue(True, True, True, known=new)
+    value = _tuple_of(cls)
     for name in dir(cls):
         member = inspect.getattr_static(cls, name)
         function = getattr(member, "__func__", member)
@@ -106,6 +103,27 @@ def walk_tuple(walk: Walk, cls: type) -> None:
             walk.captured(cls, name, getattr(cls, name))
             others = [OUTSIDE] * (function.__code__.co_argcount - 1)
             walk.function(function, Given((value, *others)))
+
+
+def _tuple_of(cls: Any) -> KnownValue:
+    """Return a named tuple, whatever is in it."""
+    new = Instance(cls)
+    for name in cls._fields:
+        new.learn(name, OUTSIDE)
+    return KnownValue(True, True, True, known=new)
+
+
+def of_tuples(walk: Walk, name: str, given: Given) -> list[KnownValue]:
+    """Return what is known of the results of methods of the named tuples that the call makes."""
+    results = []
+    for cls in list(walk.tuples):
+        method = inspect.getattr_static(cls, name, None)
+        if isinstance(method, FunctionType):
+            walk.captured(cls, name, method)
+            results.append(
+                walk.function(method, Given((_tuple_of(cls), *given.places), given.names))
+            )
+    return results
 
 
 def _is_operator(name: str, method: FunctionType) -> bool:

@@ -6,6 +6,7 @@ import ast
 import contextlib
 import importlib
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -222,19 +223,29 @@ class CallWalker(Expressions):
         raise Impure("has try ... except*", "write an if for the case that fails")
 
     def visit_With(self, node: ast.With) -> None:
-        ends_early = False
+        ends_early, body = False, node.body
         for item in node.items:
             call = item.context_expr
             entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
-            plain = entered is np.errstate or entered is contextlib.suppress
+            plain = entered in (np.errstate, contextlib.suppress, warnings.catch_warnings)
             if not plain or item.optional_vars is not None:
                 raise Impure("has a with statement", "do without it")
             ends_early |= entered is contextlib.suppress
+            if entered is warnings.catch_warnings:  # it takes back what is said about them
+                self.walk.numba_differs += ["try"]
+                body = [s for s in body if not self._is_about_warnings(s)]
         if ends_early:
             self.walk.numba_differs += ["try"]  # numba has no such word
-            self.either([node.body, []])
+            self.either([body, []])
         else:
-            self.statements(node.body)
+            self.statements(body)
+
+    def _is_about_warnings(self, node: ast.stmt) -> bool:
+        """Return whether a statement says which warnings are shown."""
+        call = node.value if isinstance(node, ast.Expr) else None
+        if not isinstance(call, ast.Call):
+            return False
+        return self.visit(call.func).known in (warnings.simplefilter, warnings.filterwarnings)
 
     def visit_Import(self, node: ast.Import) -> None:
         for alias in node.names:

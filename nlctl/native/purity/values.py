@@ -234,11 +234,11 @@ def element(value: KnownValue) -> KnownValue:
             return replace(plain, known=_of_any(inner))
         return least_upper_bound([plain, *inner]) if inner else replace(plain, known=known)
     if isinstance(known, list | tuple | EnumType) and known:
-        return replace(plain, known=_among(known))
+        return replace(plain, known=choice_among(known))
     return plain
 
 
-def _among(parts: Iterable[Any]) -> Any:
+def choice_among(parts: Iterable[Any]) -> Any:
     """Return the choice between the parts of a list that was there before the call."""
     values = [captured(part) for part in parts]
     if all(isinstance(v.known, (*PLAIN, np.ndarray)) for v in values) or len(values) > _CHOICES:

@@ -95,7 +95,7 @@ class SampledRun(SteppedRun):
         return Trajectory(
             time=np.array([self.time]), outputs=np.zeros((0, 1)), states=self.states[:, None],
             statistics=statistics, inputs=self.inputs[:, None],
-        )  # fmt: skip
+        ).cut_short(self.code.lowered.cut)  # fmt: skip
 
     def events(self) -> EventLog:
         """Return what has happened in the last step: nothing is between two samples."""

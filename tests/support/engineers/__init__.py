@@ -9,5 +9,5 @@ __all__ = ["ENTRIES", "Entry", "system"]
 for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "elementary", "language",
                "objects", "models", "everyday", "toolbox", "habits", "plants",
                "guarded", "caught", "vehicles", "processes", "laws", "lookups",
-               "packages", "iterations", "numbers_of_packages"):  # fmt: skip
+               "packages", "iterations", "numbers_of_packages", "sums_and_searches"):  # fmt: skip
     importlib.import_module(f"engineers.{_theme}")
