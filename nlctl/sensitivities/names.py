@@ -140,6 +140,7 @@ class StatePlaces:
     states: int  # of the diagram; their derivatives follow, those by one quantity together
     by: int  # number of quantities
     branches: int = 0  # number of sides of jumps that are kept
+    lines: int = 0  # number of delayed signals whose jumps come back
 
     def derivative(self, j: int) -> int:
         """Return where the derivatives by quantity `j` begin."""
@@ -157,4 +158,12 @@ class StatePlaces:
     last = property(lambda self: self.together + 3)
     # when a guard and a condition were first met at one instant
     at_reset = property(lambda self: self.together + 4)
-    size = property(lambda self: self.together + 5)  # number of all states
+    # number of jumps that were sent through delays
+    number = property(lambda self: self.together + 5)
+    # how far each delayed signal has jumped last
+    height = property(lambda self: self.number + 1)
+    # how the time of that moves, by each quantity
+    moved = property(lambda self: self.height + self.lines)
+    # how many of these jumps have left each line
+    arrived = property(lambda self: self.moved + self.by if self.lines else self.number)
+    size = property(lambda self: self.arrived + self.lines)  # number of all states

@@ -61,12 +61,12 @@ def parameters_with(
     rounding = _PASSED * max(map(abs, span))
     whole = np.concatenate([p, np.zeros(size - p.size)])
     layout = extended_program.layout
-    for j, quantity in enumerate(quantities):
+    for j in range(extended_program.groups):
         for i in range(extended_program.lines):
             slots = layout[extended_program.schedule.lines[extended_program.line(j, i)].block or 0]
             original = layout[extended_program.schedule.lines[i].block or 0]
             whole[slots["delay"].offset] = p[original["delay"].offset]
-            if quantity.place == original["before"].offset:
+            if j < len(quantities) and quantities[j].place == original["before"].offset:
                 whole[slots["before"].offset] = scale[j]
     given = {
         "scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late,
@@ -92,7 +92,8 @@ def with_its_derivatives(
     whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, (0.0, 1.0))
     source = equation_parts(compiled, extended_program, whole)
     sides = sides_of(source, n * (1 + by))
-    places = StatePlaces(states=n, by=by, branches=sides.rows)
+    lines = extended_program.lines if extended_program.returns else 0
+    places = StatePlaces(states=n, by=by, branches=sides.rows, lines=lines)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
     maker = _Maker(
@@ -160,10 +161,11 @@ class _Maker:
         jumping = list(before.jumping)
         first = places.kept + self.sides.first_memory
         for i, _, _ in before.jumping:
-            jumping += [(i, n, places.kept), (i, places.grazing, places.size)]
+            jumping += [(i, n, places.kept), (i, places.grazing, places.arrived)]
             jumping.append((i, first, first + len(before.memory)))
         if self.sides.watches:
             jumping.append((owner, n, places.last))
+            jumping += [(owner, places.number, places.arrived)] if places.lines else []
         turning, guards = list(self.saltation.at_turns()), list(before.guards)
         if turning:
             jumping += [(owner + 1, m, m + 1) for m in turning]
@@ -172,12 +174,15 @@ class _Maker:
         if self.saltation.turning:
             jumping.append((owner + 2, places.grazing, places.grazing + 1))
             guards[:0] = [owner + 2] * len(self.saltation.turning)
+        if places.lines:
+            jumping += [(owner + 3, n, places.kept), (owner + 3, places.together, places.grazing)]
+            jumping.append((owner + 3, places.number, places.size))
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         program = replace(
             before,
             layout=source.extended.layout,
             switching=source.behind,
-            guards=(*guards, *([owner] if self.sides.watches else [])),
+            guards=(*guards, *([owner] if self.sides.watches else []), *[owner + 3] * places.lines),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
         )
@@ -195,7 +200,8 @@ class _Maker:
             "m": equations.results["m"],
             "y": self._outputs(),
         }
-        if equations.results.get("reset") or self.sides.watches or self.source.driven:
+        jumping = self.sides.watches or self.source.driven or self.places.lines
+        if equations.results.get("reset") or jumping:
             results["reset"] = self._resets()
         for name in equations.results:
             if name.startswith("sample"):
@@ -239,7 +245,8 @@ class _Maker:
         leading += [(self.source.driven[m], 1) for m in self.observed]
         shown = ((self._shown(leading, j), self._shown(arriving, j)) for j in range(self.places.by))
         parts = [(leading, arriving), *shown]
-        return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
+        rows = [p for k in (0, 1) for part in parts for p in part[k]]
+        return self._rows(0, [*rows, *self.saltation.returning.arriving])
 
     def _shown(self, numbers: Sequence[SomeRows], j: int) -> list[SomeRows]:
         """Return the derivatives of numbers, of memories that are driven as they are kept."""
@@ -259,6 +266,7 @@ class _Maker:
         rows += [self.sides.driven] if source.driven else []
         rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
+        rows += self.saltation.returning.guards
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
@@ -278,6 +286,8 @@ class _Maker:
             pieces += self.sides.now[len(self.sides.sides) :]
         if self.saltation.turning:
             pieces.append((self.saltation.at_touch(), 1))
+        if self.places.lines:
+            pieces += self.saltation.at_arrival()
         return self._rows(0, pieces)
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:

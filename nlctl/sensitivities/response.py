@@ -77,7 +77,7 @@ def sensitivity_response(
         ``response["plant.y", "law.beta"]`` over ``response.time``.  Where there is no derivative
         it is NaN from there on, and ``response.missing`` says when, where and why: a condition
         that is met at a rate of 0 (grazing), two at one instant, a start on a condition,
-        switches without end, a jump that comes back through a delay.
+        switches without end, a jump that comes back through a delay that varies.
 
     Raises
     ------

@@ -124,7 +124,7 @@ def _start(
         if quantity.state >= 0:
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
-    start[places.together :] = end + 1.0 + abs(end)  # not yet
+    start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
     sides = differentiated.sides
     if not sides.rows and not differentiated.compiled.program.sampled:
         return start, {}
