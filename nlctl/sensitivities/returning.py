@@ -24,7 +24,7 @@ _ANOTHER = 0.5  # of a number of jumps
 
 @dataclass(frozen=True, kw_only=True)
 class Returning:
-    """What is known of jumps that are on their way through delays; no lines if there are none."""
+    """What is known of jumps that delays have not let out yet; no lines if there are none."""
 
     source: EquationParts
     places: StatePlaces
