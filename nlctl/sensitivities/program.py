@@ -88,12 +88,16 @@ def with_its_derivatives(
     """Compile a diagram with its derivatives."""
     by, n = len(quantities), compiled.system.nstates or 0
     combinations = [s.combination for s in signals if s.combination is not None]
-    extended_program = extended(compiled, combinations, by)
+    delays = {compiled.program.layout[line.block or 0]["delay"].offset
+              for line in compiled.schedule.lines}  # fmt: skip
+    rated = any(quantity.place in delays for quantity in quantities)
+    extended_program = extended(compiled, combinations, by, rated)
     whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, (0.0, 1.0))
     source = equation_parts(compiled, extended_program, whole)
     sides = sides_of(source, n * (1 + by))
     lines = extended_program.lines if extended_program.returns else 0
     places = StatePlaces(states=n, by=by, branches=sides.rows, lines=lines)
+    places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
     maker = _Maker(
@@ -129,7 +133,18 @@ def _seed(
         if not 0 <= start - source.inputs < extended_program.lines:
             return None
         first = source.inputs + extended_program.line(j, start - source.inputs)
-        return graph.node("leaf", data=("u", first, step), size=size, varies=True)
+        change = graph.node("leaf", data=("u", first, step), size=size, varies=True)
+        later = [
+            float(places.delays[j][start - source.inputs + step * k]) for k in range(size or 1)
+        ]
+        if not any(later):
+            return change
+        # a signal that is later by dt is lower by its rate times dt
+        first = source.inputs + extended_program.line(extended_program.rates, start - source.inputs)
+        rate = graph.node("leaf", data=("u", first, step), size=size, varies=True)
+        moves = graph.joined([(graph.const(part), 1) for part in later]) if size else None
+        rate = rate if moves is None else graph.op("mul", rate, moves)
+        return graph.op("sub", change, graph.op("mul", scale, rate))
 
     def of_parameters(start: int, step: int, size: int | None) -> Expr | None:
         rows = [start + step * i for i in range(size or 1)]

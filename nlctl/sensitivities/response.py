@@ -86,8 +86,8 @@ def sensitivity_response(
     CompileError, AlgebraicLoopError
         If the diagram cannot be compiled, is in discrete time, or something in it has no
         derivative: a parameter that numbers follow from outside of the equations, one that says
-        when samples are taken, a delay, an algebraic loop that jumps, a condition on a delayed
-        signal.
+        when samples are taken, a delay where one varies or has a history or where blocks are
+        sampled, an algebraic loop that jumps, a condition on a delayed signal.
     ParameterError
         If a value is refused.
     DivergedError

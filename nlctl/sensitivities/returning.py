@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
-from .causes import Cause
+from .causes import Cause, When
 from .directions import SomeRows
 from .names import StatePlaces
 from .source import EquationParts
@@ -48,7 +48,7 @@ class Returning:
         return [
             Cause(
                 met=self._arrived(i), grazes=no,
-                moves=[self._leaving(by + 2 + j, i) for j in range(by)],
+                moves=[self._move(j, i) for j in range(by)],
             )
             for i in range(self.places.lines)
         ]  # fmt: skip
@@ -71,6 +71,19 @@ class Returning:
                 parts = [instead.get(row, graph.leaf("u", row, None)) for row in rows]
                 leaves[leaf] = graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
         return replaced_parts(graph, exprs, leaves)
+
+    def _move(self, j: int, i: int) -> Expr:
+        """Return how the time at which a jump leaves a line moves by a quantity, its delay, too."""
+        sent = self._leaving(self.places.by + 2 + j, i)
+        if not self.places.delays[j][i]:
+            return sent
+        scale = self.graph.leaf("p", self.source.extended.slot("scale").offset + j, None)
+        return self.graph.op("add", sent, scale)
+
+    def counts(self, when: When, sent: Expr) -> Expr:
+        """Return whether what is sent through the lines jumps, at a time that moves."""
+        # What is sent at any other time leaves a line at one that moves with its delay.
+        return sent if self.source.extended.rated else self.graph.op("and", when.happens, sent)
 
     def sent(
         self, happens: Expr, earlier: Sequence[Expr], now: Sequence[SomeRows], moves: Sequence[Expr]
@@ -103,7 +116,20 @@ class Returning:
         numbers = [places.number for _ in lines]
         heights = [places.height + i for i in lines]
         moves = [places.moved + j for j in range(places.by) for _ in lines]
-        return [(self._state(place), 1) for place in [*numbers, *heights, *moves]]
+        sent = [(self._state(place), 1) for place in [*numbers, *heights, *moves]]
+        return [*sent, *self._rates] if self.source.extended.rated else sent
+
+    @property
+    def _rates(self) -> list[SomeRows]:
+        """The rates of what arrives at the lines."""
+        source = self.source
+        forward = source.time(source.moving(source.flow, source.committed), rated=True)
+        rates = source.changes([e for e, _ in source.arriving], forward)
+        return [
+            (self.graph.item(e, k), 1)
+            for e, (_, size) in zip(rates, source.arriving, strict=True)
+            for k in range(size)
+        ]
 
     def _state(self, place: int) -> Expr:
         return self.graph.leaf("x", place, None)

@@ -66,7 +66,7 @@ class Saltation:
             for s, size in rows_replaced(graph, states, across):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
-        moves = graph.op("and", when.happens, sent)
+        moves = self.returning.counts(when, sent)
         happens = [(when.apart, 1), (when.grazes, 1), (moves, 1)]
         sent_rows = self.returning.sent(moves, arriving, source.arriving, when.moves)
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
@@ -115,7 +115,7 @@ class Saltation:
         for j, move in enumerate(when.moves):
             after += self._jumped(j, rows, before, behind, move, broken)
         after.append((self._first(places.grazing, when.grazes), 1))
-        moves = graph.op("and", when.happens, sent)
+        moves = self.returning.counts(when, sent)
         after.append((self._lost_in_delay(moves), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
@@ -140,7 +140,7 @@ class Saltation:
         rows.append((self._first(self.places.together, when.apart), 1))
         arriving = returning.earlier([e for e, _ in source.arriving])
         sent = self._differ([*zip(arriving, source.arriving, strict=True)])
-        moves = graph.op("and", when.happens, sent)
+        moves = self.returning.counts(when, sent)
         rows += returning.sent(moves, arriving, source.arriving, when.moves)
         return [*rows, *returning.arrived]
 

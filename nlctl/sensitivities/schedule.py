@@ -41,11 +41,22 @@ class Extended:
     lines: int  # number of delayed signals
     by: int  # number of quantities
     returns: bool  # whether jumps are sent through these, see `returning`
+    rated: bool  # and the rates of delayed signals, by whose delays is differentiated
 
     @property
     def groups(self) -> int:
         """Number of lines for each delayed signal, besides its own."""
-        return self.by + (2 + self.by if self.returns else 0)
+        return self.rates + self.rated if self.returns else self.by
+
+    @property
+    def rates(self) -> int:
+        """The group of the rates of delayed signals."""
+        return self.by + 2 + self.by
+
+    def is_delay(self, place: int) -> list[bool]:
+        """Return of which delayed signals a parameter is the delay."""
+        blocks = [line.block or 0 for line in self.schedule.lines[: self.lines]]
+        return [self.layout[block]["delay"].offset == place for block in blocks]
 
     def line(self, j: int, i: int) -> int:
         """Return which line the derivative by quantity `j` of delayed signal `i` has."""
@@ -75,12 +86,13 @@ def _nothing(t: float, x: object, u: object, params: object) -> Any:
     return np.zeros(0)
 
 
-def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
+def extended(compiled: Compiled, outputs: Sequence[Any], by: int, rated: bool) -> Extended:
     """Return the schedule of a diagram with room for its derivatives by so many quantities."""
+    # `rated` says whether one of these is a delay.
     read = compiled.schedule
     before, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
-    returns = _may_return(compiled)
-    groups = by + (2 + by if returns else 0)
+    returns = rated or _may_return(compiled)
+    groups = by + (2 + by if returns else 0) + rated
     delays = [_derivative_of(read, i, j) for j in range(groups) for i in range(len(read.lines))]
     nothing = Node(
         path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
@@ -100,6 +112,7 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
     return Extended(
         schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
         owner=len(nodes) - _OWNERS, lines=len(read.lines), by=by, returns=returns,
+        rated=rated,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from closed_form_runs import Ball
 
 import nlctl
 
-T = np.linspace(0, 3, 25)[1:] + 1e-3  # nothing jumps at these
+T = np.linspace(0, 3, 25)[1:] + 0.0137  # nothing jumps at these
 
 
 def plant_of(update, output, inputs, outputs, states, params):
@@ -97,12 +97,36 @@ def step_in_time():
 
 
 CASES = {
-    "switch": (switch, ["plant.z"], {"plant.p": 0.5, "plant.a": 1.0, "plant.x(0)": 0.1}),
-    "relay": (relay_oscillation, ["plant.x"], {"plant.k": 2.0, "relay.on": 0.2, "plant.a": 1.0}),
-    "row": (two_in_a_row, ["plant.x", "plant.z"], {"plant.p": 0.4, "between.g": 0.8}),
-    "at once": (two_at_once, ["plant.x", "plant.z"], {"plant.a": 1.05, "plant.h": 2.0}),
-    "ball": (ball, ["plant.z"], {"ball.g": 9.81, "ball.e": 0.8, "plant.k": 2.0}),
-    "step": (step_in_time, ["plant.x"], {"source.p": 0.7, "source.h": 1.5, "gap.c_r": 0.05}),
+    "switch": (
+        switch,
+        ["plant.z"],
+        {"plant.p": 0.5, "plant.a": 1.0, "plant.x(0)": 0.1, "wire.delay": 0.3},
+    ),
+    "relay": (
+        relay_oscillation,
+        ["plant.x"],
+        {"plant.k": 2.0, "relay.on": 0.2, "plant.a": 1.0, "wire.delay": 0.17},
+    ),
+    "row": (
+        two_in_a_row,
+        ["plant.x", "plant.z"],
+        {"plant.p": 0.4, "between.g": 0.8, "wire.delay": 0.2, "second.delay": 0.33},
+    ),
+    "at once": (
+        two_at_once,
+        ["plant.x", "plant.z"],
+        {"plant.a": 1.05, "plant.h": 2.0, "wire.delay": 0.25},
+    ),
+    "ball": (
+        ball,
+        ["plant.z"],
+        {"ball.g": 9.81, "ball.e": 0.8, "plant.k": 2.0, "wire.delay": 0.21},
+    ),
+    "step": (
+        step_in_time,
+        ["plant.x"],
+        {"source.p": 0.7, "source.h": 1.5, "gap.c_r": 0.05, "wire.delay": 0.4},
+    ),
 }
 
 
@@ -135,6 +159,37 @@ def test_closed_form():
     )
     assert np.allclose(made["plant.z", "plant.p"], [0, 0, 0, -1, -1], rtol=0, atol=1e-9)
     assert np.allclose(made["plant.z", "plant.x(0)"], [0, 0, 0, 1, 1], rtol=0, atol=1e-9)
+
+
+def test_a_dead_time():
+    """x' = -k x(t - d) from x = 1, and 0 before: by d the method of steps, and a fit finds both."""
+    plant = plant_of(
+        lambda t, x, u, p: [-p["k"] * u[0]], lambda t, x, u, p: x, ["y"], ["x"], ["x"], {"k": 1.3}
+    )
+    loop = nlctl.compile(
+        nlctl.interconnect({"wire": wire(0.5, ("x",)), "plant": plant}, outputs=["x"])
+    )
+    t, k, d, start = np.array([0, 0.4, 0.7, 0.9, 1.1, 1.4]), 1.3, 0.5, {"plant.x": 1.0}
+    made = nlctl.sensitivity_response(loop, t, 0, start, with_respect_to=["wire.delay"])
+    expected = np.where(t < d, 0, np.where(t < 2 * d, k, k - 2 * k**2 * (t - 2 * d)))
+    assert np.allclose(made["x", "wire.delay"], expected, rtol=0, atol=1e-9)
+    found = nlctl.fit(loop, t, {"x": made.values[0]}, {"wire.delay": 0.4, "plant.k": 1.0}, 0, start)
+    assert np.allclose(found.values, [d, k], rtol=0, atol=1e-7)
+
+
+def test_signals_that_are_not_0_before():
+    """z' = q(t - d), q = cos t and 2 before: z = 2 d + sin(t - d), by d and by `before`."""
+    source = ct.nlsys(
+        None, lambda t, x, u, p: [np.cos(t)], inputs=0, outputs=["q"], name="source"
+    )  # fmt: skip
+    plant = plant_of(lambda t, x, u, p: [u[0]], lambda t, x, u, p: x, ["y"], ["z"], ["z"], {})
+    delay = nlctl.TransportDelay(inputs=("q",), outputs=("y",), delay=0.4, before=2.0)
+    loop = nlctl.interconnect({"source": source, "wire": delay, "plant": plant}, outputs=["z"])
+    made = nlctl.sensitivity_response(
+        loop, [0, *T], with_respect_to=["wire.delay", "wire.before"]
+    )  # fmt: skip
+    assert np.allclose(made["z", "wire.delay"][5:], 2 - np.cos(T[4:] - 0.4), rtol=0, atol=1e-8)
+    assert np.allclose(made["z", "wire.before"][5:], 0.4, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -242,14 +242,15 @@ def test_jump_that_comes_back_through_a_delay_that_varies():
 def test_condition_on_a_delayed_signal():
     """Its rate is not kept: refused."""
     loop = delayed(lambda t, x, u, p: [np.where(u[0] > 0.5, 1.0, 2.0), 0.0])
-    with pytest.raises(nlctl.errors.CompileError, match="depends on a delayed signal"):
-        nlctl.sensitivity_response(loop, [0, 1], with_respect_to=["plant.x(0)"])
+    for quantity in ("plant.x(0)", "wire.delay"):
+        with pytest.raises(nlctl.errors.CompileError, match="depends on a delayed signal"):
+            nlctl.sensitivity_response(loop, [0, 1], with_respect_to=[quantity])
 
 
 def test_what_is_refused():
-    """Delays, clocks, discrete time, and names."""
-    loop = delayed(lambda t, x, u, p: [-u[0], 0.0])
-    with pytest.raises(nlctl.errors.CompileError, match=r"'wire.delay' is a delay"):
+    """Delays that vary, clocks, discrete time, and names."""
+    loop = delayed(lambda t, x, u, p: [-u[0], 0.0], varying=lambda t: 0.1 * np.sin(t))
+    with pytest.raises(nlctl.errors.CompileError, match=r"'wire.delay' .* a delay that varies"):
         nlctl.sensitivity_response(loop, [0, 1], with_respect_to=["wire.delay"])
     law = ct.nlsys(None, lambda t, x, u, p: [-u[0]], inputs=["y"], outputs=["u"], name="law")
     plant = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="plant")
