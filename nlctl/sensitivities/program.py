@@ -23,7 +23,7 @@ from ..native.settings import Settings
 from .directions import Direction, SomeRows
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
-from .schedule import Extended, extended, with_derivatives
+from .schedule import Extended, extended, has_constant_delays, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
@@ -91,10 +91,18 @@ def with_its_derivatives(
     delays = {compiled.program.layout[line.block or 0]["delay"].offset
               for line in compiled.schedule.lines}  # fmt: skip
     rated = any(quantity.place in delays for quantity in quantities)
-    extended_program = extended(compiled, combinations, by, rated)
-    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, (0.0, 1.0))
-    source = equation_parts(compiled, extended_program, whole)
-    sides = sides_of(source, n * (1 + by))
+
+    def sides_with(returns: bool) -> KeptSides:
+        """Return what the program is made of, with or without jumps that come back."""
+        room = extended(compiled, combinations, by, returns=returns, rated=rated)
+        whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
+        return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
+
+    returns = has_constant_delays(compiled)
+    sides = sides_with(returns)
+    if returns and not (rated or sides.watches or compiled.program.guards):
+        sides = sides_with(returns=False)  # nothing jumps
+    source, extended_program = sides.source, sides.source.extended
     lines = extended_program.lines if extended_program.returns else 0
     places = StatePlaces(states=n, by=by, branches=sides.rows, lines=lines)
     places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))

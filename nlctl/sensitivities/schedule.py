@@ -86,12 +86,13 @@ def _nothing(t: float, x: object, u: object, params: object) -> Any:
     return np.zeros(0)
 
 
-def extended(compiled: Compiled, outputs: Sequence[Any], by: int, rated: bool) -> Extended:
+def extended(
+    compiled: Compiled, outputs: Sequence[Any], by: int, returns: bool, rated: bool
+) -> Extended:
     """Return the schedule of a diagram with room for its derivatives by so many quantities."""
-    # `rated` says whether one of these is a delay.
+    # `returns` and `rated` are as the record has them.
     read = compiled.schedule
     before, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
-    returns = rated or _may_return(compiled)
     groups = by + (2 + by if returns else 0) + rated
     delays = [_derivative_of(read, i, j) for j in range(groups) for i in range(len(read.lines))]
     nothing = Node(
@@ -116,12 +117,11 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int, rated: bool) -
     )  # fmt: skip
 
 
-def _may_return(compiled: Compiled) -> bool:
-    """Whether something may jump at a time that moves, and comes back through constant delays."""
-    read, program = compiled.schedule, compiled.program
+def has_constant_delays(compiled: Compiled) -> bool:
+    """Whether there are delays, none of which varies."""
+    read = compiled.schedule
     delays = [read.nodes[line.block or 0].system.current_spec for line in read.lines]
-    jumps = program.guards or program.memory or compiled.equations.conditions.located
-    return bool(delays and jumps) and all(delay.varying is None for delay in delays)
+    return bool(delays) and all(delay.varying is None for delay in delays)
 
 
 def _derivative_of(read: Schedule, i: int, j: int) -> Node:
