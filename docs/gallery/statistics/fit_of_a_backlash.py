@@ -11,7 +11,6 @@ not identify: behind a slope :math:`m` and a gain :math:`k` only :math:`m k` is 
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 
 import nlctl
 
@@ -54,25 +53,3 @@ assert abs(found.noise - 0.02) < 0.004
 both = nlctl.fit(loop, t, {"y": y}, truth | {"plant.k": 1.0})
 print("not identifiable:", both.unidentifiable)
 assert {"plant.k", "gap.m_r", "gap.m_l"} <= set(both.unidentifiable)
-
-drive = nlctl.compile(
-    nlctl.interconnect(
-        {"gap": nlctl.Backlash(m_r=1.0, m_l=1.0), "lag": nlctl.Lag(T=0.5)},
-        connections=[["lag.u", "gap.v"]], inplist=["gap.u"], inputs=["u"], outlist=["lag.v"], outputs=["y"],
-    )
-)  # fmt: skip
-ends, t = {"gap.c_r": 0.4, "gap.c_l": -0.3}, np.linspace(0, 3, 61)
-pushes = []
-for name, u in {"right": t, "left": -t}.items():
-    y = nlctl.input_output_response(drive, t, u, params=ends).outputs + 0.01 * noise[:61]
-    table = pd.DataFrame({"u": u, "y": y}, index=t)
-    pushes.append(nlctl.Measurement(data=table, name=name))
-start = {"gap.c_r": 0.6, "gap.c_l": -0.6, "lag.v(0)": 0.0}
-for push in pushes:
-    alone = nlctl.fit(drive, data=push, parameters=start)
-    print(push.name, "alone leaves open:", alone.unidentifiable)
-together = nlctl.fit(drive, data=pushes, parameters=start, separate=["lag.v(0)"])
-print(together)
-
-assert together.unidentifiable == ()
-assert np.all(abs(together.values[:2] - list(ends.values())) < 4 * together.errors[:2])
