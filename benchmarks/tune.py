@@ -9,8 +9,9 @@ Both raise the least margin of the same requirements within the same bounds (tho
 rivals are tuned in) from the same gains, in one search; CMA-ES is the package cma with its own
 defaults but for the resolution of margins, 5e-4 as that of tune, over logarithms of the gains,
 with seven seeds.  Counted are the runs until each search ends by itself, and until 90, 95 and 99 %
-of what CMA-ES gains in the median by its end are there, and until CMA-ES has what tune ends with
-("equal"); never counts as all of its runs.  Of tune
+of what CMA-ES gains in the median by its end are there, until both first have what tune ends with,
+to that resolution ("there"), and until CMA-ES has it and tune has ended ("equal"); never counts as
+all of its runs.  Of tune
 that is the time that its runs with k derivatives take, measured in the same process, over that of
 a plain run; its budget counts them as 1 + 0.7 k.
 """
@@ -237,6 +238,7 @@ def rows(problem: Problem) -> list[tuple[str, ...]]:
     )
     table = []
     targets = {f"{share:.0%}": before + share * (end - before) for share in SHARES}
+    targets["there"] = searched[-1] - RESOLUTION * (1 + abs(searched[-1]))
     for until, target in {**targets, "equal": searched[-1], "end": np.inf}.items():
         met = [np.append(np.flatnonzero(o >= target) + 1, o.size)[0] for o in others]
         median = float(np.median(met))

@@ -60,7 +60,7 @@ from .plants import PureFeedback
 from .references import FilteredStep, FunctionReference, SumOfSines
 from .response import input_output_response
 from .sampling import Clock, TriggeredHold, discretise, sampled
-from .sensitivities import fit, metric_gradient, sensitivity_response, tune
+from .sensitivities import Measurement, fit, metric_gradient, sensitivity_response, tune
 from .sliding import IdealRelay
 from .sources import Sine, Step
 
@@ -78,6 +78,7 @@ __all__ = [
     "Gain",
     "IdealRelay",
     "Lag",
+    "Measurement",
     "PureFeedback",
     "Quantiser",
     "RateLimiter",

@@ -2,14 +2,17 @@
 
 `names` looks up of what and by what, `schedule` makes room for them in a diagram's, `source` has
 its equations in parts, `branches` and `sides` are about jumps, `saltation` about
-derivatives there, `program` puts all of that together, `run` integrates it, and `missing` says
+derivatives there by what is the `causes`, `returning` about jumps that come back through delays,
+`program` puts all of that together, `run` integrates it, and `missing` says
 where there is no derivative.  `gradients` are those of metrics and margins, `fitting`
-finds parameters from data, `tuning` gains for requirements: `worth` makes its runs, `tuned` is what
-it returns.
+finds parameters from data that `measured` reads, and returns what is `fitted`; `tuning` finds
+gains for requirements: `worth` makes its runs, `tuned` is what it returns.
 """
 
-from .fitting import Fit, fit
+from .fitted import Fit, FittedExperiment
+from .fitting import fit
 from .gradients import MetricGradient, metric_gradient
+from .measured import Measurement
 from .record import NoDerivative, SensitivityResponse
 from .response import sensitivity_response
 from .tuned import Tuned
@@ -17,6 +20,8 @@ from .tuning import tune
 
 __all__ = [
     "Fit",
+    "FittedExperiment",
+    "Measurement",
     "MetricGradient",
     "NoDerivative",
     "SensitivityResponse",

@@ -21,7 +21,7 @@ from .worth import LOST_MARGIN, Worth
 
 _REACH = 0.5  # of the first step, in widths of the box
 _SHORTEST = 2e-3  # of a reach
-_KEPT = (0.25, 0.75)  # of what a step has promised: less shortens the reach, more doubles it
+_KEPT = (0.1, 0.75)  # of what a step has promised: less shortens the reach, more doubles it
 _REMEMBERED = 2  # choices of gains whose slopes count as well
 _SHARE = 0.9  # of the most that a step within reach promises: what gains that matter bring
 _MOVED = 1e-9  # of the width of the box

@@ -20,7 +20,7 @@ from .record import NoDerivative
 
 _TOGETHER = "two things happen at one instant, and each alone at another if it is moved"
 _GRAZING = "a condition is met at a rate of 0 (grazing), and may not be met if it is moved"
-_RETURNS = "a jump at a time that moves comes back through a delay"
+_RETURNS = "a jump at a time that moves comes back through a delay that varies"
 _ENDLESS = "switches follow each other without end"
 _LOST = "the derivatives cannot be integrated further, although the run itself can"
 _KINK = "the run stays on a kink, and on either side of it if it is moved"

@@ -103,9 +103,22 @@ def _check_moves(compiled: Compiled, owner: Node, name: str) -> None:
             "by these are not known; take differences of runs"
         )
     if supplied_of(owner.system) is PAST and key == "delay":
+        _check_delays(compiled, name)
+
+
+def _check_delays(compiled: Compiled, name: str) -> None:
+    """Refuse a delay where rates of what is delayed are not known, or when that jumps."""
+    read = compiled.schedule
+    specs = [read.nodes[line.block or 0].system.current_spec for line in read.lines]
+    lacks = {
+        "a delay that varies": any(spec.varying is not None for spec in specs),
+        "a history": any(spec.history is not None for spec in specs),
+        "sampled blocks": bool(compiled.program.sampled),
+    }
+    for lack in (what for what, there in lacks.items() if there):
         raise CompileError(
-            f"'{name}' is a delay: a derivative by it needs the rate of what is delayed, which "
-            "is not kept; take differences of runs"
+            f"'{name}' is a delay: derivatives by it are not known in a diagram with {lack}; take "
+            "differences of runs"
         )
 
 
@@ -140,6 +153,8 @@ class StatePlaces:
     states: int  # of the diagram; their derivatives follow, those by one quantity together
     by: int  # number of quantities
     branches: int = 0  # number of sides of jumps that are kept
+    lines: int = 0  # number of delayed signals whose jumps come back
+    delays: tuple[list[bool], ...] = ()  # by quantity: whether it is the delay of each of these
 
     def derivative(self, j: int) -> int:
         """Return where the derivatives by quantity `j` begin."""
@@ -157,4 +172,12 @@ class StatePlaces:
     last = property(lambda self: self.together + 3)
     # when a guard and a condition were first met at one instant
     at_reset = property(lambda self: self.together + 4)
-    size = property(lambda self: self.together + 5)  # number of all states
+    # number of jumps that were sent through delays
+    number = property(lambda self: self.together + 5)
+    # how far each delayed signal has jumped last
+    height = property(lambda self: self.number + 1)
+    # how the time of that moves, by each quantity
+    moved = property(lambda self: self.height + self.lines)
+    # how many of these jumps have left each line
+    arrived = property(lambda self: self.moved + self.by if self.lines else self.number)
+    size = property(lambda self: self.arrived + self.lines)  # number of all states

@@ -23,7 +23,7 @@ from ..native.settings import Settings
 from .directions import Direction, SomeRows
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
-from .schedule import Extended, extended, with_derivatives
+from .schedule import Extended, extended, has_constant_delays, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
@@ -61,12 +61,12 @@ def parameters_with(
     rounding = _PASSED * max(map(abs, span))
     whole = np.concatenate([p, np.zeros(size - p.size)])
     layout = extended_program.layout
-    for j, quantity in enumerate(quantities):
+    for j in range(extended_program.groups):
         for i in range(extended_program.lines):
             slots = layout[extended_program.schedule.lines[extended_program.line(j, i)].block or 0]
             original = layout[extended_program.schedule.lines[i].block or 0]
             whole[slots["delay"].offset] = p[original["delay"].offset]
-            if quantity.place == original["before"].offset:
+            if j < len(quantities) and quantities[j].place == original["before"].offset:
                 whole[slots["before"].offset] = scale[j]
     given = {
         "scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late,
@@ -88,11 +88,24 @@ def with_its_derivatives(
     """Compile a diagram with its derivatives."""
     by, n = len(quantities), compiled.system.nstates or 0
     combinations = [s.combination for s in signals if s.combination is not None]
-    extended_program = extended(compiled, combinations, by)
-    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, (0.0, 1.0))
-    source = equation_parts(compiled, extended_program, whole)
-    sides = sides_of(source, n * (1 + by))
-    places = StatePlaces(states=n, by=by, branches=sides.rows)
+    delays = {compiled.program.layout[line.block or 0]["delay"].offset
+              for line in compiled.schedule.lines}  # fmt: skip
+    rated = any(quantity.place in delays for quantity in quantities)
+
+    def sides_with(returns: bool) -> KeptSides:
+        """Return what the program is made of, with or without jumps that come back."""
+        room = extended(compiled, combinations, by, returns=returns, rated=rated)
+        whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
+        return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
+
+    returns = has_constant_delays(compiled)
+    sides = sides_with(returns)
+    if returns and not (rated or sides.watches or compiled.program.guards):
+        sides = sides_with(returns=False)  # nothing jumps
+    source, extended_program = sides.source, sides.source.extended
+    lines = extended_program.lines if extended_program.returns else 0
+    places = StatePlaces(states=n, by=by, branches=sides.rows, lines=lines)
+    places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
     maker = _Maker(
@@ -128,7 +141,18 @@ def _seed(
         if not 0 <= start - source.inputs < extended_program.lines:
             return None
         first = source.inputs + extended_program.line(j, start - source.inputs)
-        return graph.node("leaf", data=("u", first, step), size=size, varies=True)
+        change = graph.node("leaf", data=("u", first, step), size=size, varies=True)
+        later = [
+            float(places.delays[j][start - source.inputs + step * k]) for k in range(size or 1)
+        ]
+        if not any(later):
+            return change
+        # a signal that is later by dt is lower by its rate times dt
+        first = source.inputs + extended_program.line(extended_program.rates, start - source.inputs)
+        rate = graph.node("leaf", data=("u", first, step), size=size, varies=True)
+        moves = graph.joined([(graph.const(part), 1) for part in later]) if size else None
+        rate = rate if moves is None else graph.op("mul", rate, moves)
+        return graph.op("sub", change, graph.op("mul", scale, rate))
 
     def of_parameters(start: int, step: int, size: int | None) -> Expr | None:
         rows = [start + step * i for i in range(size or 1)]
@@ -160,10 +184,11 @@ class _Maker:
         jumping = list(before.jumping)
         first = places.kept + self.sides.first_memory
         for i, _, _ in before.jumping:
-            jumping += [(i, n, places.kept), (i, places.grazing, places.size)]
+            jumping += [(i, n, places.kept), (i, places.grazing, places.arrived)]
             jumping.append((i, first, first + len(before.memory)))
         if self.sides.watches:
             jumping.append((owner, n, places.last))
+            jumping += [(owner, places.number, places.arrived)] if places.lines else []
         turning, guards = list(self.saltation.at_turns()), list(before.guards)
         if turning:
             jumping += [(owner + 1, m, m + 1) for m in turning]
@@ -172,12 +197,15 @@ class _Maker:
         if self.saltation.turning:
             jumping.append((owner + 2, places.grazing, places.grazing + 1))
             guards[:0] = [owner + 2] * len(self.saltation.turning)
+        if places.lines:
+            jumping += [(owner + 3, n, places.kept), (owner + 3, places.together, places.grazing)]
+            jumping.append((owner + 3, places.number, places.size))
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         program = replace(
             before,
             layout=source.extended.layout,
             switching=source.behind,
-            guards=(*guards, *([owner] if self.sides.watches else [])),
+            guards=(*guards, *([owner] if self.sides.watches else []), *[owner + 3] * places.lines),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
         )
@@ -195,7 +223,8 @@ class _Maker:
             "m": equations.results["m"],
             "y": self._outputs(),
         }
-        if equations.results.get("reset") or self.sides.watches or self.source.driven:
+        jumping = self.sides.watches or self.source.driven or self.places.lines
+        if equations.results.get("reset") or jumping:
             results["reset"] = self._resets()
         for name in equations.results:
             if name.startswith("sample"):
@@ -239,7 +268,8 @@ class _Maker:
         leading += [(self.source.driven[m], 1) for m in self.observed]
         shown = ((self._shown(leading, j), self._shown(arriving, j)) for j in range(self.places.by))
         parts = [(leading, arriving), *shown]
-        return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
+        rows = [p for k in (0, 1) for part in parts for p in part[k]]
+        return self._rows(0, [*rows, *self.saltation.returning.arriving])
 
     def _shown(self, numbers: Sequence[SomeRows], j: int) -> list[SomeRows]:
         """Return the derivatives of numbers, of memories that are driven as they are kept."""
@@ -259,6 +289,7 @@ class _Maker:
         rows += [self.sides.driven] if source.driven else []
         rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
+        rows += self.saltation.returning.guards
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
@@ -278,6 +309,8 @@ class _Maker:
             pieces += self.sides.now[len(self.sides.sides) :]
         if self.saltation.turning:
             pieces.append((self.saltation.at_touch(), 1))
+        if self.places.lines:
+            pieces += self.saltation.at_arrival()
         return self._rows(0, pieces)
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:

@@ -77,7 +77,7 @@ def sensitivity_response(
         ``response["plant.y", "law.beta"]`` over ``response.time``.  Where there is no derivative
         it is NaN from there on, and ``response.missing`` says when, where and why: a condition
         that is met at a rate of 0 (grazing), two at one instant, a start on a condition,
-        switches without end, a jump that comes back through a delay.
+        switches without end, a jump that comes back through a delay that varies.
 
     Raises
     ------
@@ -86,8 +86,8 @@ def sensitivity_response(
     CompileError, AlgebraicLoopError
         If the diagram cannot be compiled, is in discrete time, or something in it has no
         derivative: a parameter that numbers follow from outside of the equations, one that says
-        when samples are taken, a delay, an algebraic loop that jumps, a condition on a delayed
-        signal.
+        when samples are taken, a delay where one varies or has a history or where blocks are
+        sampled, an algebraic loop that jumps, a condition on a delayed signal.
     ParameterError
         If a value is refused.
     DivergedError

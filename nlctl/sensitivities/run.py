@@ -132,11 +132,16 @@ def _start(
         if quantity.state >= 0:
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
-    start[places.together :] = end + 1.0 + abs(end)  # not yet
-    sides = differentiated.sides
-    if not sides.rows and not differentiated.compiled.program.sampled:
+    start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
+    sides, rated = differentiated.sides, differentiated.extended.rated
+    if not sides.rows and not differentiated.compiled.program.sampled and not rated:
         return start, {}
     arrays = _beginning(differentiated, run, u, start, p)
+    if rated:  # what is sent first may be another than what was before
+        layout, lines = differentiated.extended.layout, differentiated.extended.schedule.lines
+        before = [p[layout[line.block or 0]["before"].offset] for line in lines[: places.lines]]
+        first = _values(differentiated, sides.source.arriving, arrays)
+        start[places.number], start[places.height : places.moved] = 1.0, before - first
     start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
     memories = [*sides.source.driven, *sides.source.catching]
     arrays["x"][memories, 0] = x0[memories]  # from where they are moved

@@ -20,38 +20,19 @@ from functools import cached_property, partial, reduce
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
 from .branches import bounded
+from .causes import Cause, When, when_of
 from .directions import Direction, SomeRows, Taken, rows_replaced
 from .names import StatePlaces
+from .returning import Returning
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
 
-_AGREE = 1e-6  # derivatives of a time by two conditions that are one
-_AT_REST = 1e2  # times what is passed at once: a time that moves by less stands still
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
 _FAR = 1e300
 _WAY = "way"  # the array that stands for the derivatives of the states
 _NOW = "now"  # and the one for memories behind a jump
 _STILL = 1e-4  # of squares of what is known of a number: it does not move
-
-
-@dataclass(frozen=True, kw_only=True)
-class When:
-    """How the time at which something happens moves."""
-
-    moves: list[Expr]  # its derivative by each quantity
-    grazes: Expr  # whether what it depends on is there at a rate of 0
-    apart: Expr  # whether two conditions say different things
-    happens: Expr  # whether anything happens at a time that moves
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cause:
-    """A condition that may have been met."""
-
-    met: Expr  # whether it was
-    moves: list[Expr]  # the derivative by each quantity of the time at which it was
-    grazes: Expr  # whether it was at a rate of 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,12 +66,16 @@ class Saltation:
             for s, size in rows_replaced(graph, states, across):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
-        happens = [(when.apart, 1), (when.grazes, 1), (graph.op("and", when.happens, sent), 1)]
-        *rows, apart, grazes, jumped = self._behind_breaks([*rows, *happens])
+        moves = self.returning.counts(when, sent)
+        happens = [(when.apart, 1), (when.grazes, 1), (moves, 1)]
+        sent_rows = self.returning.sent(moves, arriving, source.arriving, when.moves)
+        behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
+        rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
+        sent_rows = behind_all[len(rows) + 3 :]
         rows.append((self._first(places.together, apart[0]), 1))
         rows.append((self._first(places.grazing, grazes[0]), 1))
-        rows.append((self._first(places.jumped, jumped[0]), 1))
-        return rows
+        rows.append((self._lost_in_delay(jumped[0]), 1))
+        return [*rows, *sent_rows]
 
     def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
         """Return numbers as they are behind all break points of t that are passed at once."""
@@ -130,11 +115,44 @@ class Saltation:
         for j, move in enumerate(when.moves):
             after += self._jumped(j, rows, before, behind, move, broken)
         after.append((self._first(places.grazing, when.grazes), 1))
-        after.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        moves = self.returning.counts(when, sent)
+        after.append((self._lost_in_delay(moves), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
+        earlier = [e for e, _ in source.arriving]
+        after += self.returning.sent(moves, earlier, later, when.moves)
         kept = {m: rows.get(m, kept) for m, kept in self.sides.memories.items()}
         return [*after, *((e, 1) for e in self.sides.kept(list(kept.values())))]
+
+    def at_arrival(self) -> list[SomeRows]:
+        """Return what follows the states where a jump leaves a delay."""
+        source, graph, returning = self.source, self.source.graph, self.returning
+        when = when_of(graph, returning.causes, self.places.by, self._rounding)
+        flow = returning.earlier([e for e, _ in source.flow])
+        flow_before = [(e, size) for e, (_, size) in zip(flow, source.flow, strict=True)]
+        before = source.moving(flow_before, returning.earlier(source.committed))
+        behind = source.moving(source.flow, source.committed)
+        rows: list[SomeRows] = []
+        for j, move in enumerate(when.moves):
+            for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
+                moved = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
+                rows.append((graph.op("select", when.apart, graph.const(0.0), moved), size))
+        rows.append((self._first(self.places.together, when.apart), 1))
+        arriving = returning.earlier([e for e, _ in source.arriving])
+        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+        moves = self.returning.counts(when, sent)
+        rows += returning.sent(moves, arriving, source.arriving, when.moves)
+        return [*rows, *returning.arrived]
+
+    def _lost_in_delay(self, moves: Expr) -> Expr:
+        """Return when a jump whose time moves was first sent through delays that do not keep it."""
+        never = self.source.graph.const(False)
+        return self._first(self.places.jumped, never if self.places.lines else moves)
+
+    @cached_property
+    def returning(self) -> Returning:
+        """Jumps that come back through delays."""
+        return Returning(source=self.source, places=self.places)
 
     @cached_property
     def turning(self) -> list[tuple[Expr, Expr]]:
@@ -395,7 +413,7 @@ class Saltation:
                 left = graph.op("and", graph.op("ne", kept, now), free)
                 rate, cause = self._met(left, level, extent, self.sides.flow_before)
                 causes += [cause] if rate is not None else []
-        return self._of_causes(causes)
+        return when_of(graph, causes, self.places.by, self._rounding)
 
     def _when_fallen(self, guards: Sequence[Expr]) -> When:
         """Return how the time moves at which a guard has fallen: the nearest to 0."""
@@ -412,9 +430,8 @@ class Saltation:
                 ago = graph.op("select", fallen, ago, far)
                 fallen_guards.append((ago, cause))
                 nearest = graph.op("minimum", nearest, ago)
-        return self._of_causes(
-            [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
-        )
+        causes = [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
+        return when_of(graph, causes, self.places.by, self._rounding)
 
     def _met(
         self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]
@@ -442,33 +459,6 @@ class Saltation:
         graph, slot = self.source.graph, self.source.extended.slot
         rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
         return graph.op("add", graph.op("mul", rtol, extent), atol)
-
-    def _of_causes(self, causes: Sequence[Cause]) -> When:
-        """Return how the time moves, by the first condition that was met at a rate."""
-        # What is left of a state at rest, such as a velocity that sticks, may change its sign where
-        # something else sets it in motion. That is met at no rate, and says nothing.
-        graph = self.source.graph
-        no, zero = graph.const(False), graph.const(0.0)
-        moves, grazes, moving = [zero] * self.places.by, no, no
-        for cause in reversed(causes):
-            met = graph.op("and", cause.met, graph.op("not", cause.grazes))
-            pairs = zip(cause.moves, moves, strict=True)
-            moves = [graph.op("select", met, a, b) for a, b in pairs]
-            moving = graph.op("or", moving, met)
-            grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
-        grazes = graph.op("and", grazes, graph.op("not", moving))
-        apart = happens = no
-        agree, still = graph.const(_AGREE), graph.op("mul", graph.const(_AT_REST), self._rounding)
-        for cause in causes:
-            met = graph.op("and", cause.met, graph.op("not", cause.grazes))
-            for a, b in zip(cause.moves, moves, strict=True):
-                gap = graph.op("absolute", graph.op("sub", a, b))
-                size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
-                differs = graph.op("gt", gap, graph.op("add", still, graph.op("mul", agree, size)))
-                apart = graph.op("or", apart, graph.op("and", met, differs))
-        for move in moves:
-            happens = graph.op("or", happens, graph.op("ne", move, zero))
-        return When(moves=moves, grazes=grazes, apart=apart, happens=happens)
 
 
 def _sum(graph: Graph, one: Taken, other: Taken) -> Taken:

@@ -17,7 +17,7 @@ from ..native.diagram.parameters import Slot, length
 from ..native.diagram.schedule import Schedule
 from ..native.diagram.wiring import Signal
 
-_OWNERS = 3  # blocks of the derivatives' own: see `Extended.owner`
+_OWNERS = 4  # blocks of the derivatives' own: see `Extended.owner`
 
 
 class ScheduleWithRates(Schedule):
@@ -35,13 +35,32 @@ class Extended:
 
     schedule: Schedule
     layout: dict[int, dict[str, Slot]]  # StatePlaces of all parameters, behind those of the diagram
-    # the block that conditions belong to; memories that turn belong to the next, and what
-    # turns before a condition to the one behind
+    # the block that conditions belong to; memories that turn belong to the next, what turns before
+    # a condition to the one behind, and jumps that leave delays to the last
     owner: int
     lines: int  # number of delayed signals
+    by: int  # number of quantities
+    returns: bool  # whether jumps are sent through these, see `returning`
+    rated: bool  # and the rates of delayed signals, by whose delays is differentiated
+
+    @property
+    def groups(self) -> int:
+        """Number of lines for each delayed signal, besides its own."""
+        return self.rates + self.rated if self.returns else self.by
+
+    @property
+    def rates(self) -> int:
+        """The group of the rates of delayed signals."""
+        return self.by + 2 + self.by
+
+    def is_delay(self, place: int) -> list[bool]:
+        """Return of which delayed signals a parameter is the delay."""
+        blocks = [line.block or 0 for line in self.schedule.lines[: self.lines]]
+        return [self.layout[block]["delay"].offset == place for block in blocks]
 
     def line(self, j: int, i: int) -> int:
         """Return which line the derivative by quantity `j` of delayed signal `i` has."""
+        # behind these: numbers, heights, and the derivatives of times of what jumps
         return self.lines * (1 + j) + i
 
     def slot(self, name: str) -> Slot:
@@ -67,11 +86,15 @@ def _nothing(t: float, x: object, u: object, params: object) -> Any:
     return np.zeros(0)
 
 
-def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
+def extended(
+    compiled: Compiled, outputs: Sequence[Any], by: int, returns: bool, rated: bool
+) -> Extended:
     """Return the schedule of a diagram with room for its derivatives by so many quantities."""
+    # `returns` and `rated` are as the record has them.
     read = compiled.schedule
     before, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
-    delays = [_derivative_of(read, i, j) for j in range(by) for i in range(len(read.lines))]
+    groups = by + (2 + by if returns else 0) + rated
+    delays = [_derivative_of(read, i, j) for j in range(groups) for i in range(len(read.lines))]
     nothing = Node(
         path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
         inputs=(), direct=np.zeros((0, 0), dtype=bool),
@@ -89,8 +112,16 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
     }
     return Extended(
         schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
-        owner=len(nodes) - _OWNERS, lines=len(read.lines),
+        owner=len(nodes) - _OWNERS, lines=len(read.lines), by=by, returns=returns,
+        rated=rated,
     )  # fmt: skip
+
+
+def has_constant_delays(compiled: Compiled) -> bool:
+    """Whether there are delays, none of which varies."""
+    read = compiled.schedule
+    delays = [read.nodes[line.block or 0].system.current_spec for line in read.lines]
+    return bool(delays) and all(delay.varying is None for delay in delays)
 
 
 def _derivative_of(read: Schedule, i: int, j: int) -> Node:
@@ -135,14 +166,17 @@ def with_derivatives(
 
     direct, lines = direct_lines(compiled.schedule), extended_program.schedule.lines
     arriving = []
-    for j in range(-1, by):
+    signals = set(range(extended_program.lines)) if extended_program.returns else set()
+    for j in range(-1, extended_program.groups):
         for row in direct:
-            reached = [
+            reached = {
                 extended_program.line(other, int(i))
                 for i in np.flatnonzero(row)
-                for other in {-1, j}
-            ]
-            arriving.append({lines[k]: 1.0 for k in reached})
+                for other in {-1, j if j < by else -1}
+            }
+            # where a jump leaves a line, all derivatives jump, and another one may be sent
+            reached |= signals if j >= 0 else set()
+            arriving.append({lines[k]: 1.0 for k in sorted(reached)})
     return replace(
         extended_program.schedule,
         system=stand_in(compiled.system, states, outputs),

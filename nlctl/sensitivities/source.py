@@ -152,13 +152,21 @@ class EquationParts:
         return [switching_function(self.graph, condition) for condition in of]
 
     def time(
-        self, pieces: Sequence[SomeRows], time: Expr | None = None, delays_move: bool = True
+        self,
+        pieces: Sequence[SomeRows],
+        time: Expr | None = None,
+        delays_move: bool = True,
+        rated: bool = False,
     ) -> Direction:
         """Return the direction in which everything goes with these rates of the states."""
-        # By `time`, 1 if it is None. The rates of delayed signals count as 0 unless `delays_move`.
+        # By `time`, 1 if it is None. The rates of delayed signals count as 0 unless `delays_move`,
+        # and are known where they are `rated`.
         first = self.extended.schedule.ninputs - self.extended.schedule.rates
+        extended_program = self.extended
         lines = range(self.inputs, first if delays_move else self.inputs)
-        outside = from_time(self.graph, time, self.inputs, first, lines)
+        rates = self.inputs + extended_program.line(extended_program.rates, 0)
+        rates = rates if rated else None
+        outside = from_time(self.graph, time, self.inputs, first, lines, rates)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
     def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:

@@ -1,0 +1,57 @@
+"""Conditions that may have been met, and how the time of the one that was moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..expressions.graph import Expr, Graph
+
+_AGREE = 1e-6  # derivatives of a time by two conditions that are one
+_AT_REST = 1e2  # times what is passed at once: a time that moves by less stands still
+
+
+@dataclass(frozen=True, kw_only=True)
+class When:
+    """How the time at which something happens moves."""
+
+    moves: list[Expr]  # its derivative by each quantity
+    grazes: Expr  # whether what it depends on is there at a rate of 0
+    apart: Expr  # whether two conditions say different things
+    happens: Expr  # whether anything happens at a time that moves
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """A condition that may have been met."""
+
+    met: Expr  # whether it was
+    moves: list[Expr]  # the derivative by each quantity of the time at which it was
+    grazes: Expr  # whether it was at a rate of 0
+
+
+def when_of(graph: Graph, causes: Sequence[Cause], by: int, rounding: Expr) -> When:
+    """Return how a time moves by `by` quantities, by the first condition that was met at a rate."""
+    # What is left of a state at rest, such as a velocity that sticks, may change its sign where
+    # something else sets it in motion. That is met at no rate, and says nothing.
+    no, zero = graph.const(False), graph.const(0.0)
+    moves, grazes, moving = [zero] * by, no, no
+    for cause in reversed(causes):
+        met = graph.op("and", cause.met, graph.op("not", cause.grazes))
+        pairs = zip(cause.moves, moves, strict=True)
+        moves = [graph.op("select", met, a, b) for a, b in pairs]
+        moving = graph.op("or", moving, met)
+        grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
+    grazes = graph.op("and", grazes, graph.op("not", moving))
+    apart = happens = no
+    agree, still = graph.const(_AGREE), graph.op("mul", graph.const(_AT_REST), rounding)
+    for cause in causes:
+        met = graph.op("and", cause.met, graph.op("not", cause.grazes))
+        for a, b in zip(cause.moves, moves, strict=True):
+            gap = graph.op("absolute", graph.op("sub", a, b))
+            size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
+            differs = graph.op("gt", gap, graph.op("add", still, graph.op("mul", agree, size)))
+            apart = graph.op("or", apart, graph.op("and", met, differs))
+    for move in moves:
+        happens = graph.op("or", happens, graph.op("ne", move, zero))
+    return When(moves=moves, grazes=grazes, apart=apart, happens=happens)

@@ -1,0 +1,145 @@
+"""Jumps that come back through delays: when, how far, and how the time of each moves.
+
+What jumps at a time t* that moves jumps once more where it leaves a delay d, at t* + d, which moves
+as well.  So behind each delayed signal more is sent the same way: how many such jumps there have
+been, how far the signal has jumped last, and the derivatives of t*.  Where another number leaves a
+delay than has left it before, a jump has arrived: the run ends a step there anyway, and what was
+sent says what derivatives need (`saltation`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..expressions.bends import replaced_parts
+from ..expressions.graph import Expr, Graph, needed
+from .causes import Cause, When
+from .directions import SomeRows
+from .names import StatePlaces
+from .source import EquationParts
+
+_ANOTHER = 0.5  # of a number of jumps
+
+
+@dataclass(frozen=True, kw_only=True)
+class Returning:
+    """What is known of jumps that delays have not let out yet; no lines if there are none."""
+
+    source: EquationParts
+    places: StatePlaces
+
+    @property
+    def graph(self) -> Graph:
+        """Where the expressions are kept."""
+        return self.source.graph
+
+    @property
+    def guards(self) -> list[Expr]:
+        """What falls through 0 where a jump leaves each line."""
+        graph, one, fallen = self.graph, self.graph.const(1.0), self.graph.const(-1.0)
+        lines = range(self.places.lines)
+        return [graph.op("select", self._arrived(i), fallen, one) for i in lines]
+
+    @property
+    def causes(self) -> list[Cause]:
+        """Which lines a jump has left, and how the time of that moves."""
+        by, no = self.places.by, self.graph.const(False)
+        return [
+            Cause(
+                met=self._arrived(i), grazes=no,
+                moves=[self._move(j, i) for j in range(by)],
+            )
+            for i in range(self.places.lines)
+        ]  # fmt: skip
+
+    def earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
+        """Return expressions by what left the lines before the jumps that have just arrived."""
+        graph, places, first = self.graph, self.places, self.source.inputs
+        instead: dict[int, Expr] = {}
+        for i in range(places.lines):
+            now = self._leaving(-1, i)
+            before = graph.op("add", now, self._leaving(places.by + 1, i))
+            instead[first + i] = graph.op("select", self._arrived(i), before, now)
+        leaves = {}
+        for leaf in needed(exprs):
+            if leaf.op != "leaf" or leaf.data[0] != "u":
+                continue
+            _, start, step = leaf.data
+            rows = [start + step * i for i in range(leaf.size or 1)]
+            if any(row in instead for row in rows):
+                parts = [instead.get(row, graph.leaf("u", row, None)) for row in rows]
+                leaves[leaf] = graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+        return replaced_parts(graph, exprs, leaves)
+
+    def _move(self, j: int, i: int) -> Expr:
+        """Return how the time at which a jump leaves a line moves by a quantity, its delay, too."""
+        sent = self._leaving(self.places.by + 2 + j, i)
+        if not self.places.delays[j][i]:
+            return sent
+        scale = self.graph.leaf("p", self.source.extended.slot("scale").offset + j, None)
+        return self.graph.op("add", sent, scale)
+
+    def counts(self, when: When, sent: Expr) -> Expr:
+        """Return whether what is sent through the lines jumps, at a time that moves."""
+        # What is sent at any other time leaves a line at one that moves with its delay.
+        return sent if self.source.extended.rated else self.graph.op("and", when.happens, sent)
+
+    def sent(
+        self, happens: Expr, earlier: Sequence[Expr], now: Sequence[SomeRows], moves: Sequence[Expr]
+    ) -> list[SomeRows]:
+        """Return number, heights and times of jumps, behind one that is sent if it `happens`."""
+        graph, places = self.graph, self.places
+        if not places.lines:
+            return []
+        number = graph.op("add", self._state(places.number), graph.const(1.0))
+        heights = [
+            graph.item(graph.op("sub", a, b), k)
+            for a, (b, size) in zip(earlier, now, strict=True)
+            for k in range(size)
+        ]
+        return [
+            (graph.op("select", happens, new, self._state(places.number + k)), 1)
+            for k, new in enumerate([number, *heights, *moves])
+        ]
+
+    @property
+    def arrived(self) -> list[SomeRows]:
+        """The numbers of jumps that have left the lines."""
+        lines = range(self.places.lines)
+        return [(self._leaving(self.places.by, i), 1) for i in lines]
+
+    @property
+    def arriving(self) -> list[SomeRows]:
+        """What is sent through the lines behind the derivatives."""
+        places, lines = self.places, range(self.places.lines)
+        numbers = [places.number for _ in lines]
+        heights = [places.height + i for i in lines]
+        moves = [places.moved + j for j in range(places.by) for _ in lines]
+        sent = [(self._state(place), 1) for place in [*numbers, *heights, *moves]]
+        return [*sent, *self._rates] if self.source.extended.rated else sent
+
+    @property
+    def _rates(self) -> list[SomeRows]:
+        """The rates of what arrives at the lines."""
+        source = self.source
+        forward = source.time(source.moving(source.flow, source.committed), rated=True)
+        rates = source.changes([e for e, _ in source.arriving], forward)
+        return [
+            (self.graph.item(e, k), 1)
+            for e, (_, size) in zip(rates, source.arriving, strict=True)
+            for k in range(size)
+        ]
+
+    def _state(self, place: int) -> Expr:
+        return self.graph.leaf("x", place, None)
+
+    def _leaving(self, group: int, i: int) -> Expr:
+        """Return what leaves line `i` of a group: -1 has the signals, then `Extended.line`."""
+        return self.graph.leaf("u", self.source.inputs + self.source.extended.line(group, i), None)
+
+    def _arrived(self, i: int) -> Expr:
+        """Return whether a jump leaves a line now."""
+        graph, places = self.graph, self.places
+        apart = graph.op("sub", self._leaving(places.by, i), self._state(places.arrived + i))
+        return graph.op("gt", graph.op("absolute", apart), graph.const(_ANOTHER))
