@@ -84,7 +84,7 @@ def trajectory(
         outputs = finish(run)
     reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
     reached = at_its_end(run, reached)
-    refuse_cut_loops(compiled, reached.statistics, bool(compiled.equations.graph.of_passes))
+    refuse_cut_loops(compiled, reached.statistics, bool(compiled.equations_with(p).graph.of_passes))
     if run.spare is not None:
         give_back(compiled.cache, run.spare)
     return reached

@@ -295,7 +295,8 @@ def _group(every: Members, numbers: range, course: Course, stop: Event) -> Itera
             yield trajectory(course, x0[:, j], p[:, j])
         else:
             member = replace(made(run, outputs, j), happened=happened(compiled, run, j))
-            refuse_cut_loops(compiled, member.statistics, compiled.equations.graph.is_cut)
+            is_cut = compiled.equations_with(p[:, j]).graph.is_cut
+            refuse_cut_loops(compiled, member.statistics, is_cut)
             yield member
 
 

@@ -14,7 +14,6 @@ from ...annotations import as_annotated
 from ...attributes import described_record
 from ...errors import CompileError, ParameterError
 from ...native.driver import Course, prepared
-from ...native.equations.blocks import Equations, equations
 from ...native.integrate.log import Log
 from ...native.integrate.memory import arrays_alike, with_fields
 from ...native.integrate.methods.lu import WHOLE
@@ -130,7 +129,7 @@ def web_program(
     settings = Settings(**given, max_steps=1_000_000_000)
     run = _laid_out(compiled, grid, u, start, p, settings)
     lowered = run.machine.lowered
-    timed = timed_program(_equations_with(compiled, p), compiled.program.layout)
+    timed = timed_program(compiled.equations_with(p), compiled.program.layout)
     texts = {
         "program": rounding_alike(lowered.text),
         "timed": rounding_alike(timed.text),
@@ -148,13 +147,6 @@ def web_program(
         p=p, x0=start, u=u,
         digest=digest(lowered.text, values, start),
     )  # fmt: skip
-
-
-def _equations_with(compiled: native.Compiled, p: np.ndarray) -> Equations:
-    """Return the equations of a run's parameters: integers among them may steer what they are."""
-    if compiled.lowered.holds_for(p[:, None]):
-        return compiled.equations
-    return equations(compiled.schedule, compiled.program.layout, p)
 
 
 def _check(compiled: native.Compiled, what: str) -> None:
@@ -183,7 +175,7 @@ def _laid_out(
     course = Course(compiled=compiled, times=times, inputs=u, settings=settings)
     run = prepared(course, start[:, None], p[:, None])
     task, work = run.task, run.work
-    conditions = compiled.lowered.conditions
+    conditions = run.machine.lowered.conditions
     timed = task.timed
     if conditions.of_time:
         jumps = np.full((1, _BREAKS), np.inf)
