@@ -11,7 +11,14 @@ from .. import native
 from ..annotations import as_annotated
 from ..diagrams import initial_state as state_of
 from .records import ExportedEquations
-from .words import c_name, check_written_out, digest, parameter_values, refuse_if_any
+from .words import (
+    c_name,
+    check_integers,
+    check_written_out,
+    digest,
+    parameter_values,
+    refuse_if_any,
+)
 
 
 @as_annotated
@@ -46,7 +53,8 @@ def export_equations(
         If the name is none in C.
     CompileError
         If functions in C cannot say it: sampled blocks, resets, transport delays, functions that
-        are called, a search for signals of an algebraic loop, discrete time.
+        are called, a search for signals of an algebraic loop, discrete time, other integers in
+        `params` that steer equations.
 
     Examples
     --------
@@ -60,6 +68,7 @@ def export_equations(
     check_written_out(compiled, what)
     _check_continuous(compiled, what)
     p = compiled.parameter_vector(params)
+    check_integers(compiled, p, what)
     values, start = parameter_values(compiled, p), state_of(diagram, initial_state)
     labels, lowered = tuple(compiled.state_labels or ()), compiled.lowered
     return ExportedEquations(

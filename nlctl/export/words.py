@@ -74,6 +74,15 @@ def check_written_out(compiled: Compiled, what: str) -> None:
     refuse_if_any(what, {"has an algebraic loop, whose signals are searched for": searched})
 
 
+def check_integers(compiled: Compiled, p: np.ndarray, what: str) -> None:
+    """Refuse parameters with which the equations are others than those of the diagram."""
+    if not compiled.lowered.holds_for(p[:, None]):
+        raise CompileError(
+            f"'{what}' cannot be exported: integers among the parameters steer its equations: set "
+            "them in the diagram"
+        )
+
+
 def refuse_if_any(what: str, reasons: Mapping[str, bool], purpose: str = "be exported") -> None:
     """Refuse a diagram for the first reason that holds."""
     for reason, holds in reasons.items():

@@ -12,10 +12,9 @@ import numpy as np
 from ..errors import ParameterError
 from ..upstream.systems import System
 from .compiled import Compiled
-from .machine import address
 from .machine.address import call_out, call_rhs
 from .machine.evaluations import prepared_parameters
-from .machine.fingerprint import function_key, module_key
+from .machine.fingerprint import function_key
 from .machine.machine_code import Wanted, machine_code
 
 MATRIX, COLUMNS = numba.float64[:, ::1], numba.float64[:, :, ::1]
@@ -61,7 +60,7 @@ def discrete_loop() -> Any:
     """Return the loop that all diagrams share as machine code; without JIT unchanged."""
     options = {"error_model": "numpy", "nogil": True}
     wanted = Wanted(function=_iterate, signature=LOOP, options=options)
-    (loop,) = machine_code(function_key(_iterate, module_key(address)), [wanted])
+    (loop,) = machine_code(function_key(_iterate), [wanted])
     return loop
 
 

@@ -21,11 +21,10 @@ from .machine.routine import Routine
 def followed(compiled: Compiled, p: np.ndarray) -> Callable[..., float] | None:
     """Return what says up to which part of a step sharp functions are followed, None for none."""
     # ``part(places, t, x, u)`` with the states and inputs at these parts of a step, columns
-    kinds = compiled.lowered.sharp
+    code, c = prepared_parameters(compiled, p)
+    kinds, rows = code.lowered.sharp, code.lowered.rows
     if not kinds:
         return None
-    code, c = prepared_parameters(compiled, p)
-    rows = code.lowered.rows
     x_now, u_now, s = (np.empty((rows[name], 1)) for name in "xus")
     now, (function,) = np.empty(1), code.sharp
     given = now, x_now, u_now, c, s

@@ -23,8 +23,8 @@ from ..upstream.numba_internals import checks_indices, is_jit_disabled
 from .integrate import advance, evaluate, start
 from .integrate.memory import data_address
 from .integrate.workspace import TASK, WORK
-from .machine import address, store
-from .machine.fingerprint import function_key, module_key
+from .machine import store
+from .machine.fingerprint import function_key
 from .machine.finish import finished
 from .machine.machine_code import Wanted, store_key
 
@@ -117,15 +117,14 @@ def sources_key(files: list[str]) -> str:
 
 def integrator_key() -> str:
     """Return a key that changes with whatever the integrators' machine code is made of."""
-    wanted = ((each.function, each.signature.args) for each in WANTED)
-    return function_key(module_key(address), *wanted)
+    return function_key(*((each.function, each.signature.args) for each in WANTED))
 
 
 def _made_anew() -> bytes:
     """Return what numba makes of the sources, from the cache if it is there."""
     from .machine.export import exported
 
-    key = store_key(integrator_key(), "bitcode")
+    key = store_key(integrator_key(), function_key(exported), "bitcode")
     code = store.read(key)
     if code is None:
         code = exported(WANTED)

@@ -57,6 +57,19 @@ class Reading:
         """What the blocks' functions compute as expressions."""
         return equations(self.schedule, self.program.layout, meetings=self.program.meetings)
 
+    def equations_with(self, p: np.ndarray) -> Equations:
+        """Return what they compute with a parameter vector: its integers may steer what that is."""
+
+        def fits(read: Equations) -> bool:
+            return all(p[place] == value for place, value in read.graph.assumptions.items())
+
+        def read_again() -> Equations:
+            return equations(self.schedule, self.program.layout, p, self.program.meetings)
+
+        if fits(self.equations):
+            return self.equations
+        return self.cache.found(Equations, fits, read_again)
+
     @cached_property
     def lowered(self) -> Lowered:
         """The plan of a program for one member."""

@@ -22,6 +22,10 @@ from ..host.files import replace_file
 from .integrators import HERE, SHIPPED, WANTED, sources_key
 from .machine.export import exported
 
+# files, and what counts of them: "" for everything
+_ROOTS = [(f"integrate/{name}.py", "") for name in ("advance", "start", "workspace")]
+_ROOTS += [("machine/export.py", "exported")]
+
 
 def ship(path: Path = SHIPPED) -> None:
     """Write the bitcode, with what it was made of, to a file."""
@@ -36,29 +40,58 @@ def ship(path: Path = SHIPPED) -> None:
     replace_file(path, lambda file: file.write(json.dumps(header).encode() + b"\n" + code))
 
 
-def source_files(*modules: str) -> list[str]:
-    """Return the files of the engine that modules are made of: themselves and what they import."""
-    # By default those of the integrators.
-    found = [*(modules or ("integrate/advance.py", "integrate/start.py", "integrate/workspace.py"))]
-    for name in found:  # which grows meanwhile; what others import from elsewhere is not compiled
-        imported = () if name.startswith("..") else _imported(HERE / name)
-        found += [other for other in dict.fromkeys(imported) if other not in found]
-    return sorted(found)
+def source_files() -> list[str]:
+    """Return the files of nlctl that the integrators' bitcode is made of, and by."""
+    # Of files elsewhere only what is imported counts, and what that is made of.
+    parts = [*_ROOTS]
+    for name, part in parts:  # which grows meanwhile
+        whole = name.startswith("integrate/")
+        parts += [
+            other
+            for other in dict.fromkeys(_made_of(HERE / name, "" if whole else part))
+            if other not in parts
+        ]
+    return sorted({name for name, _ in parts})
 
 
-def _imported(path: Path) -> Iterator[str]:
-    """Yield the files of nlctl that a file of the engine imports, by their paths from there."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def _made_of(path: Path, part: str) -> Iterator[tuple[str, str]]:
+    """Yield by file and name what a file of nlctl imports, or what one name in it is made of."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    imported = dict(_imports(path, body))
+    if not part:
+        yield from imported.values()
+        return
+    here = Path(os.path.relpath(path, HERE)).as_posix()
+    of_part = [node for node in body if part in _names_in(node, ast.Store)]
+    for name in {part, *(name for node in of_part for name in _names_in(node, ast.Load))}:
+        if name in imported:
+            yield imported[name]
+        elif any(name in _names_in(node, ast.Store) for node in body):
+            yield here, name
+
+
+def _names_in(node: ast.AST, kind: type[ast.expr_context]) -> set[str]:
+    """Return the names that a statement reads, annotations aside, or that it gives a value."""
+    every = list(ast.walk(node))
+    notes = [getattr(n, field, None) for n in every for field in ("annotation", "returns")]
+    aside = {id(part) for note in notes if note is not None for part in ast.walk(note)}
+    named = (n for n in every if isinstance(n, ast.Name) and id(n) not in aside)
+    names = {n.id for n in named if isinstance(n.ctx, kind)}
+    return names | ({getattr(node, "name", "")} if kind is ast.Store else set())
+
+
+def _imports(path: Path, body: list[ast.stmt]) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield what a file imports from files of nlctl: its name here, the file and its name there."""
+    for node in (n for statement in body for n in ast.walk(statement)):
         if isinstance(node, ast.ImportFrom) and node.level:
             folder = path.parents[node.level - 1]
             inner = folder / (node.module or "").replace(".", "/")
-            files = [inner / f"{each.name}.py" for each in node.names]
-            files += [inner.with_suffix(".py")] if node.module else []
-            yield from (
-                Path(os.path.relpath(file, HERE)).as_posix()
-                for file in files
-                if file.exists() and file.is_relative_to(HERE.parent)
-            )
+            for each in node.names:
+                module, file = inner / f"{each.name}.py", inner.with_suffix(".py")
+                place = module if module.exists() else file
+                if place.exists() and place.is_relative_to(HERE.parent):
+                    there = Path(os.path.relpath(place, HERE)).as_posix()
+                    yield each.asname or each.name, (there, "" if place is module else each.name)
 
 
 if __name__ == "__main__":

@@ -90,11 +90,10 @@ def _compiled(
     settings: Settings,
 ) -> Differentiated:
     """Return a diagram that is compiled with its derivatives, made when it is first needed."""
-    assumed = {i: p[i] for i in compiled.equations.graph.assumptions}
-    key = repr((signals, quantities, assumed))
+    key = repr((signals, quantities))
     entries = compiled.cache.of(_Kept)
     for entry in entries:
-        if entry.key == key:
+        if entry.key == key and entry.holds_for(p):
             return entry.differentiated
     why = inexact(compiled, tuple(compiled.equations.results))
     if why is not None:
@@ -111,10 +110,16 @@ def _compiled(
 
 @dataclass(frozen=True, kw_only=True)
 class _Kept:
-    """What has been compiled, of what, by what and for which integers."""
+    """What has been compiled, of what and by what."""
 
     key: str
     differentiated: Differentiated
+
+    def holds_for(self, p: np.ndarray) -> bool:
+        """Whether the integers that its equations were read with are those of parameters."""
+        # with other integers a function may ask for further ones
+        assumed = self.differentiated.compiled.equations.graph.assumptions
+        return all(p[place] == value for place, value in assumed.items())
 
 
 def _start(

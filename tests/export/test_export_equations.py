@@ -41,6 +41,22 @@ def test_conditions_and_memories_are_counted():
         assert f"#define LOOP_CONDITIONS {conditions}" in c_files(equations)["loop.h"]
 
 
+def test_other_integers_that_steer_the_equations_are_refused():
+    """Those of the diagram are written, and the functions would compute another loop."""
+
+    def update(t, x, u, p):
+        rate = 0.0 * x[0]
+        for _ in range(p["n"]):
+            rate = rate + p["k"]
+        return [-rate * x[0]]
+
+    params = {"n": 3, "k": 0.5}
+    loop = ct.nlsys(update, None, inputs=0, states=1, name="loop", params=params)
+    assert export_equations(loop, params={"n": 3, "k": 0.7}).parameters["loop.k"] == 0.7
+    with pytest.raises(CompileError, match="integers among the parameters steer its equations"):
+        export_equations(loop, params={"n": 5})
+
+
 REFUSED = {
     "sampled blocks": lambda: nlctl.sampled(
         ct.ss([], [], [], -1.0, 0.1, inputs="y", outputs="u", name="law")

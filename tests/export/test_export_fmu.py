@@ -15,6 +15,8 @@ from fmi_models import MODELS, linear, simulated
 import nlctl
 from nlctl.errors import CompileError, ParameterError, UnknownNameError, UsageError
 from nlctl.export import fmu
+from nlctl.export.fmi.reading import read_model
+from nlctl.export.fmi.source import sources, token_of
 
 pytestmark = pytest.mark.export
 
@@ -285,6 +287,17 @@ def test_without_the_extra_it_is_said_what_to_install(tmp_path, monkeypatch, mod
     with pytest.raises(UsageError, match=r"nlctl\[export\]"):
         fmu(linear()[0], tmp_path / "model.fmu")
     assert not list(tmp_path.iterdir())
+
+
+def test_another_binary_has_another_token():
+    """Importers know by it that they have a binary already: with other equations or numbers."""
+    tokens = set()
+    for gain, stop_time, tolerance in ((1, 10, 1e-6), (2, 10, 1e-6), (1, 20, 1e-6), (1, 10, 1e-3)):
+        lag = ct.ss(-1, gain, 1, 0, name="lag")
+        model = read_model(lag, None, None, "lag", stop_time, tolerance)
+        assert token_of(sources(model, 3)) == token_of(sources(model, 3))
+        tokens.add(token_of(sources(model, 3)))
+    assert len(tokens) == 4
 
 
 def test_a_state_is_kept_and_taken_up_again(written):

@@ -157,6 +157,26 @@ def test_it_is_the_run_of_the_engine_within_its_tolerance():
 
 
 @pytest.mark.ci
+def test_integers_that_are_given_steer_functions_of_time_as_those_of_the_diagram():
+    """n jumps of t, of which the diagram's own number is 1: the module of a diagram with n."""
+    needed("ziglang", "export")
+
+    def update(t, x, u, p):
+        rate = -x[0]
+        for k in range(p["n"]):
+            rate = rate + (1.0 if t > p["T"] * (k + 1) else 0.0)
+        return [rate]
+
+    def program(n, **given):
+        diagram = ct.nlsys(update, None, inputs=0, outputs=1, states=1, name="stairs",
+                           params={"n": n, "T": 0.3})  # fmt: skip
+        return web_program(diagram, np.linspace(0, 2, 21), **given)
+
+    given, own = program(1, params={"n": 3}), program(3)
+    assert given.facts == own.facts
+    assert given.module == own.module
+
+
 def test_a_fault_that_is_switched_on_begins_when_it_is_said(in_node):
     loop, onset = faulty(), "fault_actuator_v.onset"
     program = web_program(loop, TIMES)

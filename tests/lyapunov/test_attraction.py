@@ -285,3 +285,23 @@ def test_barriers_in_space_name_what_is_wrong(change, message):
     given = {"system": saddles, "box": EVERYWHERE, "start": disc((1.5, 0.0), 0.25)} | change
     with pytest.raises(ParameterError, match=message):
         barrier(given.pop("system"), given.pop("box"), **given)
+
+
+def damped(t, x, u, p):
+    """x'' + (2 - n) x' + x = 0: calm for n = 1, unstable from n = 3 on."""
+    pushed = 0.0 * x[0]
+    for _ in range(p["n"]):
+        pushed = pushed + x[1]
+    return [x[1], -x[0] - 2.0 * x[1] + pushed]
+
+
+def test_integers_that_are_given_steer_what_is_proved():
+    """Of a diagram that is compiled once: with n = 1 it is proved, with n = 4 it is false."""
+    diagram = ct.nlsys(damped, None, inputs=0, states=2, name="s", params={"n": 1})
+    loop = nlctl.compile(diagram)
+    box, start = Box.of(x1=(-3, 3), x2=(-3, 3)), Box.of(x1=(0.9, 1.1), x2=(-0.1, 0.1))
+    far = {"start": start, "unsafe": Box.of(x1=(-3, -0.95), x2=(-3, 3))}
+    for n, status in ((1, "proved"), (4, "undecided"), (1, "proved")):
+        assert barrier(loop, box, params={"n": n}, **far).status == status
+    run = nlctl.input_output_response(loop, np.linspace(0, 4, 41), 0, [1.0, 0.0], params={"n": 4})
+    assert run.states.min() < -0.95

@@ -14,22 +14,26 @@ from pathlib import Path
 from types import ModuleType
 
 import control as ct
+import llvmlite
 import numba
 import numpy as np
 import pytest
+import scipy
 import source_text
 from hypothesis import given
 from hypothesis import strategies as st
 from numba.core import config, event
+from scipy import constants as physics
 
 import nlctl
 from nlctl.errors import CacheWarning, CompileError
 from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
+from nlctl.native.machine import machine_code as machine_code_module
 from nlctl.native.machine.calls import loaded
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
-from nlctl.native.machine.machine_code import Wanted, kept, machine_code
-from nlctl.native.opaque.called import TAUGHT, Source
+from nlctl.native.machine.machine_code import TEACHERS, Wanted, kept, machine_code
+from nlctl.native.opaque.called import Source
 
 PACKAGE = Path(nlctl.__file__).parent
 REAL = numba.float64(numba.float64)
@@ -298,7 +302,7 @@ class TestMachineCode:
 
     def test_a_program_runs_from_its_own_source(self, folder):
         """Sources on disk are not looked at, and a traceback shows the line."""
-        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={}, taught=())
+        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={})
         folder.mkdir(mode=0o700)
         (folder / f"nlctl_program_{program_key(program)}.py").write_text("raise SystemExit")
         module = loaded(program, {})
@@ -416,6 +420,62 @@ class TestKeys:
         assert keys[0] != keys[1]
         assert keys[0] == keys[2]
 
+    @pytest.mark.parametrize("kind", [float, int, complex])
+    def test_numbers_of_a_class_of_ones_own_count(self, kind):
+        """numba takes them for what they are derived from."""
+        own = type("Own", (kind,), {})
+
+        def keys(value):
+            held = own(value)
+            return function_key(lambda x: held * x)
+
+        assert keys(2) == keys(2)
+        assert keys(2) != keys(3)
+
+    def test_numbers_of_libraries_count(self, monkeypatch):
+        """``physics.c`` of another version, or set by somebody; other names do not."""
+
+        def reading(x):
+            return physics.c * x
+
+        keys = []
+        for c, other in ((1.0, 0), (2.0, 0), (1.0, 1)):
+            monkeypatch.setattr(physics, "c", c)
+            monkeypatch.setattr(physics, "h", other)
+            keys.append(function_key(reading))
+        assert keys[0] != keys[1]
+        assert keys[0] == keys[2]
+
+    def test_what_is_found_by_a_text_counts(self):
+        """``getattr(constants, "gain")``."""
+        constants = ModuleType("constants_of_a_user")
+
+        def reading(x):
+            return getattr(constants, "gain") * x  # noqa: B009 (that is the case)
+
+        keys = []
+        for constants.gain in (1.0, 2.0):
+            keys.append(function_key(reading))
+        assert keys[0] != keys[1]
+
+    def test_versions_of_what_may_be_called_count(self, monkeypatch):
+        """Functions of these are named in keys, and not read."""
+        keys = {machine_code_module._compiler.__wrapped__()}
+        for library in (numba, llvmlite, np, scipy, ct):
+            with monkeypatch.context() as patch:
+                patch.setattr(library, "__version__", "0.0")
+                keys.add(machine_code_module._compiler.__wrapped__())
+        assert len(keys) == 6
+
+    def test_what_makes_object_code_counts(self, monkeypatch):
+        """Passes and options, and functions that have them."""
+        keys = {finish._key("text")}
+        for name in ("program_code", "_emitted", "_machine"):
+            with monkeypatch.context() as patch:
+                patch.setattr(finish, name, lambda *given: given)
+                keys.add(finish._key("text"))
+        assert len(keys) == 4
+
     def test_names_of_fields_count(self):
         """Two records with the same values in another order."""
         one, other = namedtuple("Point", "a b")(1.0, 2.0), namedtuple("Point", "b a")(1.0, 2.0)
@@ -482,9 +542,9 @@ def keys_of_copy(path, edits):
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
         "import nlctl; from nlctl.native.integrators import integrator_key\n"
-        "from nlctl.native.opaque.called import TAUGHT\n"
+        "from nlctl.native.machine.machine_code import TEACHERS\n"
         "from nlctl.native.machine.fingerprint import module_key\n"
-        "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
+        "print(nlctl.__file__, integrator_key(), module_key(*TEACHERS))"
     )
     run = subprocess.run(
         [sys.executable, "-c", script], cwd=path, env=os.environ | {"PYTHONPATH": str(path)},
@@ -502,7 +562,7 @@ class TestSources:
     @pytest.mark.slow
     def test_a_copy_has_the_same_keys(self, tmp_path):
         """Paths and processes do not count."""
-        assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TAUGHT)]
+        assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TEACHERS)]
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
@@ -511,11 +571,12 @@ class TestSources:
     )
     def test_an_edit_of_any_module_of_the_integrators(self, tmp_path, name):
         """Constants, coefficients, generated code, options."""
-        assert keys_of_copy(tmp_path, {name: EDITS[name]})[0] != integrator_key()
+        before = [integrator_key(), module_key(*TEACHERS)]
+        assert keys_of_copy(tmp_path, {name: EDITS[name]}) != before
 
     def test_use_does_not_change_a_key(self):
         """What a code generator remembers is not a part of it."""
-        before = module_key(*TAUGHT), integrator_key()
+        before = module_key(*TEACHERS), integrator_key()
         for k in range(3):
             scope = source_text.run(
                 f"def helper(v):\n    return {k} * v\n\n\n"
@@ -523,7 +584,7 @@ class TestSources:
             )
             system = ct.nlsys(scope["function"], None, inputs=0, outputs=1, states=1, name="used")
             nlctl.compile(system).native  # noqa: B018
-        assert (module_key(*TAUGHT), integrator_key()) == before
+        assert (module_key(*TEACHERS), integrator_key()) == before
 
     @pytest.mark.slow
     def test_an_edit_of_a_code_generator(self, tmp_path):
@@ -532,4 +593,4 @@ class TestSources:
         edits = {"purity/dicts.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
-        assert taught != module_key(*TAUGHT)
+        assert taught != module_key(*TEACHERS)

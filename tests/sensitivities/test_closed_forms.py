@@ -528,3 +528,26 @@ def test_python_rounds():
         assert made.success
         slope = -sum(k + shift for k, place in enumerate(places) if place < 1)
         assert abs(made["y", "plant.q"][-1] - slope) < 1e-7
+
+
+def steered(t, x, u, p):
+    """x' = -g k x: g is 1 in the first mode, n in the second, and the first does not ask for n."""
+    rate = 0.0 * x[0]
+    for part in range(p["mode"]):
+        for _ in range(p["n"] - 1 if part else 1):
+            rate = rate + p["k"]
+    return [-rate * x[0]]
+
+
+def test_an_integer_that_only_other_integers_ask_for_counts():
+    """One compiled diagram, whose derivatives are kept: dx/dk = -g t exp(-g k t)."""
+    values = {"mode": 1, "n": 3, "k": 0.5}
+    loop = nlctl.compile(ct.nlsys(steered, None, inputs=0, states=1, name="s", params=values))
+    times = np.linspace(0, 2, 5)
+    for mode, n in ((1, 3), (2, 3), (2, 5), (1, 5), (2, 3)):
+        run = nlctl.sensitivity_response(
+            loop, times, 0, 1.0, params={"mode": mode, "n": n}, with_respect_to=["s.k"], rtol=1e-9
+        )
+        g = n if mode == 2 else 1
+        exact = -g * times * np.exp(-g * 0.5 * times)
+        np.testing.assert_allclose(run["x[0]", "s.k"], exact, rtol=0, atol=1e-7)

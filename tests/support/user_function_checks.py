@@ -134,7 +134,8 @@ class Plain:
 
     def lowered(self, lanes: int) -> Any:
         if lanes not in self.programs:
-            self.programs[lanes] = lower(self.compiled.schedule, self.compiled.program, lanes)
+            made = self.compiled  # its equations have been read already
+            self.programs[lanes] = lower(made.schedule, made.program, lanes, made.equations)
         return self.programs[lanes]
 
     def run(self, at: Points, params: Any = None) -> tuple[np.ndarray, np.ndarray]:
@@ -241,7 +242,6 @@ def _pure(system: Any, made: user_functions.Pieces) -> Verdict:
 def _impure(system: Any) -> Verdict:
     """Try to compile; what is called as it stands must be refused by the compiler at the latest."""
     compiled = nlctl.compile(system)
-    lowered = lower(compiled.schedule, compiled.program, 1)
-    if lowered.opaque:
+    if compiled.lowered.opaque:
         _ = compiled.native
-    return Verdict("accepted", "traced" if not lowered.opaque else "machine code")
+    return Verdict("accepted", "traced" if not compiled.lowered.opaque else "machine code")

@@ -190,7 +190,6 @@ def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
     return plant.terms if isinstance(plant, PureFeedback) else (plant.f, plant.d)
 
 
-@functools.lru_cache(maxsize=32)
 def update_is_declared(plant: Place) -> bool:
     """Whether the update function and the chain of f and d are the same expressions."""
     # False where they differ, and where that is unknown: expressions that are equal but written in

@@ -106,6 +106,7 @@ def _quantity(quantity: Uncertain) -> dict[str, Any]:
     return {
         "law": f"{law.dist.name}({', '.join(map(str, numbers))})",
         "quantiles": [f"{v:.10g}" for v in law.ppf(PROBES)],  # of a law of the user's own as well
+        "content": short_key(law),  # a histogram has its numbers nowhere else
         "bounds": list(quantity.box),
         "nominal": quantity.nominal,
         "unit": quantity.unit,

@@ -18,7 +18,7 @@ from ...native.timed.ahead import ahead
 from ...sampling.clock import Clock, schedules
 from ...sliding.relay import SLIDING
 from ...wording import counted
-from ..words import c_name, check_written_out, refuse_if_any
+from ..words import c_name, check_integers, check_written_out, refuse_if_any
 from .records import Happenings, Model
 from .variables import all_variables, value_references
 
@@ -39,11 +39,7 @@ def read_model(
     _check(compiled, what)
     p = compiled.parameter_vector(params)
     start, lowered = state_of(system, initial_state), compiled.lowered
-    if not lowered.holds_for(p[:, None]):
-        raise CompileError(
-            f"'{what}' cannot be exported: integers among the parameters steer its equations: set "
-            "them in the diagram"
-        )
+    check_integers(compiled, p, what)
     happenings = _happenings(compiled, p, stop_time, what)
     rows = lowered.rows
     at = value_references(rows["x"], rows["u"], rows["y"], rows["g"] + len(program.memory), p.size)

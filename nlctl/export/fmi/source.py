@@ -27,7 +27,7 @@ def sources(model: Model, version: int) -> dict[str, str]:
         for name in (*_SHARED, f"fmi{version}.c")
     }  # fmt: skip
     equations, tables = _equations(model), f'#include "model.h"\n\n{_tables(model)}\n'
-    text = "".join([equations, tables, *shared.values(), __version__])
+    text = "".join([_header(model, ""), equations, tables, *shared.values(), __version__])
     header = _header(model, f"{{{UUID(hashlib.sha256(text.encode()).hexdigest()[:32])}}}")
     return {"model.h": header, "equations.h": equations, "tables.c": tables, **shared}
 

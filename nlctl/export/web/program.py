@@ -130,7 +130,7 @@ def web_program(
     settings = Settings(**given, max_steps=1_000_000_000)
     run = _laid_out(compiled, grid, u, start, p, settings)
     lowered = run.machine.lowered
-    timed = timed_program(compiled.equations, compiled.program.layout)
+    timed = timed_program(compiled.equations_with(p), compiled.program.layout)
     texts = {
         "program": rounding_alike(lowered.text),
         "timed": rounding_alike(timed.text),
@@ -176,7 +176,7 @@ def _laid_out(
     course = Course(compiled=compiled, times=times, inputs=u, settings=settings)
     run = prepared(course, start[:, None], p[:, None])
     task, work = run.task, run.work
-    conditions = compiled.lowered.conditions
+    conditions = run.machine.lowered.conditions
     timed = task.timed
     if conditions.of_time:
         room = np.full((2, 1, _BREAKS), np.inf)

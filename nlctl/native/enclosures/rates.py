@@ -17,7 +17,7 @@ def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> l
     # Its external inputs are 0.
     _check(compiled)
     p = compiled.parameter_vector(params)
-    arrays = [array for _, array in compiled.equations.results["dx"]]
+    arrays = [array for _, array in compiled.equations_with(p).results["dx"]]
     numbers = [array[i].only for array in arrays for i in range(array.size)]
     _, rates = scalar_expressions(numbers)
 

@@ -24,7 +24,7 @@ import numpy as np
 from ...errors import UsageError
 from ...upstream.numba_internals import NumbaWarning, address_of
 from ..opaque.called import Call, Source
-from .fingerprint import Sourced, module_key, program_key
+from .fingerprint import Sourced, program_key
 from .machine_code import Wanted, machine_code_if_taken
 
 _ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
@@ -122,7 +122,6 @@ def _by_numba(call: Call, lanes: int) -> Any:
     source = Source(
         source="\n".join(["@equation", known.source, "", *_of_member(call, lanes), ""]),
         names=known.names,
-        taught=known.taught,
     )
     module = loaded(source, {})
     request = Wanted(
@@ -130,7 +129,7 @@ def _by_numba(call: Call, lanes: int) -> Any:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
-        return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", request)
+        return machine_code_if_taken(module.__name__, request)
 
 
 def _of_member(call: Call, lanes: int) -> list[str]:

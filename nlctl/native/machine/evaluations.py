@@ -91,11 +91,14 @@ def machine(
     for code in known:
         if code.width == width and asked <= set(code.meetings) and code.lowered.holds_for(p):
             return code
-    traced, schedule, program = reading.equations, reading.schedule, reading.program
+    schedule, program = reading.schedule, reading.program
     extra = [what for what in happening if what not in program.meetings]
     meetings = (*program.meetings, *dict.fromkeys(extra))
-    if extra or not all(p[i, 0] == value for i, value in traced.graph.assumptions.items()):
-        traced = equations(schedule, program.layout, p[:, 0], meetings)
+    traced = (
+        equations(schedule, program.layout, p[:, 0], meetings)
+        if extra
+        else reading.equations_with(p[:, 0])
+    )
     lowered = lower(schedule, program, width, traced)
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")

@@ -18,6 +18,7 @@ import sys
 import sysconfig
 import types
 from collections.abc import Iterable, Iterator
+from numbers import Number
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -172,7 +173,10 @@ def _plain(thing: object, seen: _Seen | None = None) -> Any:
         return thing
     if seen is not None and seen.deep and _is_users(type(thing)):  # it may hold more
         return thing
-    return getattr(thing, "py_func", getattr(thing, "__wrapped__", thing))
+    try:
+        return getattr(thing, "py_func", getattr(thing, "__wrapped__", thing))
+    except OSError:  # `ctypes.cdll` looks for a library of that name
+        return thing
 
 
 def _of_container(thing: tuple | list | dict, seen: _Seen) -> Iterator[str]:
@@ -202,7 +206,7 @@ def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
     for given in (function.__defaults__, function.__kwdefaults__):
         yield from _fingerprint(given, seen)
     names = _all_names(function.__code__)
-    if seen.deep and "getattr" in names:
+    if "getattr" in names:
         names = sorted({*names, *_all_texts(function.__code__)})
     for cell in function.__closure__ or ():
         yield from _fingerprint(in_cell(cell), seen, names)
@@ -304,7 +308,7 @@ def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
     # objects of a library's class may hold what is in no attribute of Python's
     bases = [base for base in type(thing).__mro__[:-1] if not _is_users(base)]
     held_apart = (b.__flags__ & HEAP_TYPE == 0 or b.__module__.startswith("pandas.") for b in bases)
-    if seen.deep and any(held_apart):
+    if any(held_apart):
         held = inherited(thing)  # a float with a name, a list with more
         yield from (held,) if isinstance(held, str) else _fingerprint(held, seen)
 
@@ -340,9 +344,14 @@ def _of_held(thing: object, held: object, seen: _Seen) -> Iterator[str]:
 
 def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> Iterator[str]:
     """Yield text for what is read of a module, ``module.name``; a library has its version."""
-    # Every name that the reader uses may be one.
+    # Every name that the reader uses may be one. Numbers of libraries count as well: ``physics.g``
+    # is another one in another version, or where somebody has set it.
     yield f"module {module.__name__} {getattr(module, '__version__', '')}"
-    if _is_library(module.__name__) or not seen.add(module):
+    if _is_library(module.__name__):
+        read = ((name, vars(module).get(name)) for name in names)
+        yield from (f"{name} {value!r}" for name, value in read if isinstance(value, Number))
+        return
+    if not seen.add(module):
         return
     for name in names:
         if name in vars(module):
@@ -362,11 +371,13 @@ def _of_numba_type(kind: numba.types.Type, seen: _Seen) -> Iterator[str]:
 
 
 def _defined(module: types.ModuleType) -> Iterator[str]:
-    """Yield a module's source, and its functions and methods as they are in memory."""
+    """Yield a module's source, and its functions, methods and constants as they are in memory."""
     # What these refer to is in the source, and may change while they are used.
     with contextlib.suppress(OSError, TypeError):  # there is none
         yield inspect.getsource(module)
     for name, thing in vars(module).items():
+        if isinstance(thing, Number | str | tuple) and not name.startswith("__"):
+            yield f"{name} {_constant(thing)}"
         if getattr(thing, "__module__", None) != module.__name__:
             continue
         for part in vars(thing).values() if isinstance(thing, type) else [thing]:

@@ -26,6 +26,7 @@ import llvmlite.binding as llvm
 
 from ...errors import CompileError
 from . import store
+from .fingerprint import function_key
 
 PASSES = (
     "always_inliner", "sroa", "instruction_combine", "simplify_cfg", "new_gvn",
@@ -106,10 +107,13 @@ def _emitted(module: Any, machine: Any, passes: Any, builder: Any) -> bytes:
     return machine.emit_object(module)
 
 
+_MAKER = _object_code  # with all that it calls and reads: passes and options
+
+
 def _key(source: str | bytes) -> str:
-    """Return a key of IR and of what object code is made of besides."""
+    """Return a key of IR and of what object code is made of and made by besides."""
     versions = llvmlite.__version__, llvm.llvm_version_info
-    parts = (source, *_processor(), *versions, PASSES, TUNING)
+    parts = (source, *_processor(), *versions, function_key(_MAKER))
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 

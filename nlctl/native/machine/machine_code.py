@@ -16,9 +16,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import cloudpickle
+import control as ct
 import llvmlite
 import numba
 import numpy as np
+import scipy
 
 from ...upstream.numba_internals import (
     CodeCache,
@@ -29,8 +31,11 @@ from ...upstream.numba_internals import (
     processor,
     settings,
 )
-from . import store
-from .fingerprint import function_key
+from ..purity import dicts
+from . import address, store
+from .fingerprint import function_key, module_key
+
+TEACHERS = (address, dicts)  # they extend numba; functions do not name them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,9 +130,16 @@ class _ByArguments(CodeCache):
 def store_key(key: str, *more: object) -> str:
     """Return the key of what was compiled by this numba, for this processor, with its settings."""
     python = sys.implementation.cache_tag, platform.python_version()
-    versions = numba.__version__, llvmlite.__version__, np.__version__
-    text = repr((key, more, python, versions, processor(), settings()))
+    text = repr((key, more, python, _compiler(), processor(), settings()))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+@functools.cache
+def _compiler() -> tuple[str, ...]:
+    """Return the versions of what compiles code and is called in it, and a key of what we add."""
+    # a function of python-control or SciPy, which keys name and do not read, may be in the code
+    versions = (library.__version__ for library in (numba, llvmlite, np, scipy, ct))
+    return (*versions, module_key(*TEACHERS))
 
 
 def _write(key: str, data: list[Any]) -> None:

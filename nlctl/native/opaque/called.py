@@ -14,7 +14,6 @@ from itertools import pairwise
 from types import FunctionType
 from typing import Any
 
-import numba
 import numpy as np
 from numba import carray  # pyright: ignore[reportPrivateImportUsage]
 
@@ -27,11 +26,10 @@ from ...upstream.systems import System
 from ...wording import counted
 from ..diagram.nodes import Node
 from ..diagram.parameters import Slot, current_values
-from ..purity import dicts
 from ..purity.dicts import (
     as_vector,
     callable_constant,
-    make_callable,
+    callable_now,
     params_record,
     read_by_keys,
     unpacked_arguments,
@@ -39,16 +37,13 @@ from ..purity.dicts import (
 from ..purity.objects import frozen
 from .remedies import remedy_of
 
-TAUGHT = (dicts,)  # modules that teach numba what functions of others use
-
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """Source for numba, what it refers to by name, and the modules that teach numba."""
+    """Source for numba, and what it refers to by name."""
 
     source: str
     names: Mapping[str, Any]
-    taught: tuple[Any, ...]
 
     def namespace(self, *, native: bool) -> dict[str, Any]:
         """Return everything that the source refers to, by name."""
@@ -226,7 +221,7 @@ def _source(name: str, stands: _AsItStands, system: System) -> Source:
     names = {"record": record, "as_vector": as_vector, "read_by_keys": read_by_keys}
     names |= {f"fixed{i}": callable_constant(stands.template[k]) for i, k in enumerate(fixed)}
     names |= {f"function{k}": _jitted(frozen(f)) for k, f in enumerate(stands.functions)}
-    return Source(source="\n".join([*lines, ""]), names=names, taught=TAUGHT)
+    return Source(source="\n".join([*lines, ""]), names=names)
 
 
 def _counts(stands: _AsItStands, count: int) -> list[int]:
@@ -258,5 +253,4 @@ def _jitted(function: object) -> Any:
         return function
     if not isinstance(function, FunctionType):
         raise CompileError(f"{function!r} is not a plain function")
-    make_callable(function)
-    return numba.njit(function, error_model="numpy", nogil=True, boundscheck=True)
+    return callable_now(function, error_model="numpy", nogil=True, boundscheck=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from array import array
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, compress
 from operator import getitem, is_, not_
@@ -20,7 +20,15 @@ import numpy as np
 
 from .values import PLAIN
 
-GONE = object()
+
+class _Gone:
+    """What stands for a value where there is none."""
+
+    def __repr__(self) -> str:
+        return "absent"
+
+
+GONE = _Gone()
 _SEQUENCES = (list, tuple, deque, bytearray, array)
 _OF_PARTIALS = ("func", "args", "keywords")
 _TABLES = ("scipy.interpolate", "scipy.spatial.transform", "numpy.polynomial")
@@ -32,7 +40,7 @@ class Captured:
 
     holder: Any  # what it is read from: a closure's cell, a module's names, an object
     name: str  # name in the holder
-    then: Callable[..., Any]  # what it was: a copy, where it can change in place
+    then: Any  # what it was: a copy, where it can change in place
 
     @property
     def now(self) -> Any:
@@ -83,7 +91,7 @@ class CapturedValues:
 
     def __init__(self, notes: Iterable[Captured]) -> None:
         every = tuple({(id(n.holder), n.name, id(n.then)): n for n in notes}.values())
-        is_alike = [n.now is n.then for n in every]
+        is_alike = [n.now is n.then is not GONE for n in every]
         self.notes, self.others = every, list(compress(every, map(not_, is_alike)))
         in_dict = [n for n in compress(every, is_alike) if type(n.holder) is dict]
         alike = [n for n in compress(every, is_alike) if type(n.holder) is not dict]

@@ -12,10 +12,9 @@ from __future__ import annotations
 import ast
 import functools
 import operator
-import weakref
 from collections import namedtuple
 from collections.abc import Sequence
-from types import FunctionType
+from types import CellType, FunctionType
 from typing import Any
 
 import numba
@@ -32,6 +31,7 @@ from numba.extending import (
 
 from ...errors import UsageError
 from ...expressions.source import Unreadable, definition
+from .objects import moved_function
 from .values import python_function
 
 FILLER = "no_parameters"  # numba cannot call methods of a record without fields
@@ -72,32 +72,39 @@ def unpacked_arguments(function: object) -> set[int]:
     }
 
 
-_KNOWN: weakref.WeakSet[FunctionType] = weakref.WeakSet()  # a function may call itself
+def callable_now(function: FunctionType, **options: Any) -> Any:
+    """Return a function that machine code can call, with the plain functions that it refers to."""
+    # numba keeps the machine code of a function for ever, with what its constants were at first.
+    # So it is given copies; the functions themselves stay as they are.
+    return _copied(function, {}, options)
 
 
-def make_callable(function: FunctionType) -> None:
-    """Let machine code call the plain functions that a function refers to, and theirs."""
-    # numba knows them from then on; the functions themselves stay as they are.
-    used = [cell.cell_contents for cell in function.__closure__ or ()]
-    used += [function.__globals__.get(name) for name in function.__code__.co_names]
-    for other in used:
-        library = getattr(other, "__module__", None) or ""
-        if not isinstance(other, FunctionType) or library.partition(".")[0] in _LIBRARIES:
-            continue
-        if other not in _KNOWN:
-            _KNOWN.add(other)
-            register_jitable(other)
-            make_callable(other)
+def _copied(function: FunctionType, copies: dict[FunctionType, Any], options: Any) -> Any:
+    names, cells = dict(function.__globals__), function.__closure__ or ()
+    places = [CellType() for _ in cells]
+    copied = moved_function(function, function.__code__, names, places)
+    code = copies[function] = numba.njit(**options)(copied)  # a function may call itself
+    for name in function.__code__.co_names:
+        if name in names:
+            names[name] = _callable_part(names[name], copies)
+    for place, cell in zip(places, cells, strict=True):
+        place.cell_contents = _callable_part(cell.cell_contents, copies)
+    return code
+
+
+def _callable_part(thing: object, copies: dict[FunctionType, Any]) -> Any:
+    """Return what a function refers to, a plain function as one that machine code can call."""
+    library = str(getattr(thing, "__module__", None)).partition(".")[0]
+    if not isinstance(thing, FunctionType) or library in _LIBRARIES:
+        return thing
+    return copies[thing] if thing in copies else _copied(thing, copies, {})
 
 
 def callable_constant(value: object) -> Any:
     """Return a function as one that machine code can hand on; any other value as it is."""
     if isinstance(value, np.ufunc):
         return numba.njit(error_model="numpy")(lambda v: value(v))
-    if isinstance(value, FunctionType):
-        make_callable(value)
-        return numba.njit(error_model="numpy")(value)
-    return value
+    return callable_now(value, error_model="numpy") if isinstance(value, FunctionType) else value
 
 
 class Params(types.Type):

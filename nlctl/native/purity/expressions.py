@@ -15,6 +15,7 @@ import numpy as np
 
 from ...expressions.source import cells_of, source_file
 from . import known_calls, made
+from .captured import GONE, Captured
 from .known_calls import MEMORY
 from .values import (
     FRESH,
@@ -106,6 +107,7 @@ class Expressions(ast.NodeVisitor):
         builtin = builtin if isinstance(builtin, dict) else vars(builtin)
         if name in function.__globals__:
             return self.walk.captured(function.__globals__, name, function.__globals__[name])
+        self.walk.note([Captured(function.__globals__, name, GONE)])  # a global would come first
         return self.walk.captured(builtin, name, builtin[name]) if name in builtin else OUTSIDE
 
     def assign(self, name: str, value: KnownValue) -> None:

@@ -87,13 +87,20 @@ def _of_scipy(thing: Any) -> Any:
         coordinates = thing.tocoo()
         return ("sparse", kind.__name__, coordinates.shape, *coordinates.coords, coordinates.data)
     if room == "stats" and hasattr(thing, "dist"):
-        return ("law", type(thing.dist), thing.dist.name, thing.args, thing.kwds)
+        return ("law", *_of_laws(thing.dist), thing.args, thing.kwds)
+    if room == "stats" and hasattr(thing, "_updated_ctor_param"):
+        return ("laws", *_of_laws(thing))
     if room == "interpolate" and hasattr(thing, "_eval_args"):
         return ("spline", kind.__name__, thing._eval_args, getattr(thing, "ext", None))
     if room == "spatial" and (hasattr(thing, "points") or hasattr(thing, "_points")):
         known = ("points", "_points", "simplices", "neighbors", "equations", "vertices", "regions")
         return ("mesh", kind.__name__, {k: v for k, v in vars(thing).items() if k in known})
     return None
+
+
+def _of_laws(family: Any) -> tuple[Any, ...]:
+    """Return what SciPy makes a copy of a family of laws from: a histogram's numbers, too."""
+    return (type(family), family.name, family._updated_ctor_param())
 
 
 def inherited(thing: object) -> Any:

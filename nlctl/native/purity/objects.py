@@ -63,10 +63,11 @@ def frozen(function: object) -> Any:
     same = all(new is old for new, (_, old) in zip(new_cells, old_cells, strict=True))
     if same and not new_globals:
         return function
-    return _with(function, function.__code__, function.__globals__ | new_globals, new_cells)
+    names = function.__globals__ | new_globals
+    return moved_function(function, function.__code__, names, new_cells)
 
 
-def _with(
+def moved_function(
     function: FunctionType, code: CodeType, names: dict[str, Any], cells: Any
 ) -> FunctionType:
     """Return a function with other code, which finds other things around it."""
@@ -160,7 +161,7 @@ def without_imports(function: FunctionType) -> FunctionType:
     names = dict(function.__globals__)
     exec(compile(ast.Module(hoisted.found, []), "imports", "exec"), names)
     code = _moved(body, function)
-    return _with(function, code, names, map(cells_of(function).get, code.co_freevars))
+    return moved_function(function, code, names, map(cells_of(function).get, code.co_freevars))
 
 
 class _Hoist(ast.NodeTransformer):

@@ -11,7 +11,6 @@ from ...errors import ParameterError
 from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.rewrite import rewritten
 from ..diagram.parameters import length
-from ..equations.blocks import equations
 from ..equations.relays import relay_places
 from ..integrate.memory import zeros
 from ..lower import Lowered, planned, stores_of
@@ -79,9 +78,7 @@ def _check(reading: Reading) -> None:
 
 def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
     _check(reading)
-    read = reading.equations
-    if not all(p[i, 0] == value for i, value in read.graph.assumptions.items()):
-        read = equations(reading.schedule, reading.program.layout, p[:, 0])
+    read = reading.equations_with(p[:, 0])
     lowered, recurrence = _lowered(reading, read, width)
     layout = _layout(lowered)
     switching = reading.program.events + read.conditions.rows

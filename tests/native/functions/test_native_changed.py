@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 import control as ct
 import numpy as np
 import pytest
+import scipy.constants
+import source_text
 from scipy import interpolate
 
 import nlctl
@@ -376,6 +378,39 @@ def changed_part_of_a_diagram():
     own = system(lambda t, x, u, p: [-2.0 * x[0]])
     loop = ct.interconnect([own], inplist=["s.u[0]"], outlist=["s.y[0]"])
     return loop, lambda: loop.syslist.__setitem__(0, system(lambda t, x, u, p: [-9.0 * x[0]]))
+
+
+def changed_builtin_that_the_module_names():
+    """A name that was Python's becomes the module's."""
+    module = source_text.run("def rate(t, x, u, p):\n    return [-2.0 * abs(x[0])]\n")
+    return system(module["rate"]), lambda: module.update(abs=lambda v: 4.5 * v)
+
+
+OF_NUMBA = """
+import numpy as np
+
+ZERO, K = np.float32(0.0), 2.0  # single precision is not written out: numba takes the function
+
+def helper(x):
+    return -K * x
+
+def rate(t, x, u, p):
+    return [helper(x[0]) + ZERO]
+"""
+
+
+def changed_constant_of_a_helper_in_machine_code():
+    """numba keeps the machine code of a function with what its constants were at first."""
+    module = source_text.run(OF_NUMBA)
+    return system(module["rate"]), lambda: module.update(K=9.0)
+
+
+def changed_number_of_a_library(monkeypatch):
+    """In machine code as well, which a new compilation finds on disk."""
+    monkeypatch.setattr(scipy.constants, "g", 2.0)
+    text = "from scipy import constants\n" + OF_NUMBA.replace("-K", "-constants.g")
+    rate = source_text.run(text)["rate"]
+    return system(rate), lambda: monkeypatch.setattr(scipy.constants, "g", 9.0)
 
 
 CHANGES = [value for name, value in sorted(globals().items()) if name.startswith("changed_")]

@@ -176,7 +176,7 @@ def test_the_cache_tells_modules_apart():
             return x
 
         update.__module__ = module
-        keys.add(program_key(Source(source="", names={"update": update}, taught=())))
+        keys.add(program_key(Source(source="", names={"update": update})))
     assert len(keys) == 2
 
 

@@ -10,7 +10,7 @@ from user_function_native import accepted, run
 ENTRIES = {entry.name: entry for entry in user_functions.ENTRIES}
 PURE = [entry for entry in ENTRIES.values() if entry.pure]
 IMPURE = [entry for entry in ENTRIES.values() if not entry.pure]
-GROUPS = 48  # of entries that are compiled one by one
+GROUPS = 96  # of entries that are compiled one by one
 
 machine_code = pytest.mark.skipif(
     getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT"

@@ -16,7 +16,7 @@ from numba.core import config, event
 
 import nlctl
 from nlctl import paper
-from nlctl.native import driver, integrators
+from nlctl.native import driver, integrators, ship
 from nlctl.native.integrators import SHIPPED, WANTED, shipped_bitcode, sources_key
 from nlctl.native.ship import source_files
 
@@ -47,6 +47,30 @@ def test_all_that_is_compiled_belongs_to_these_sources():
     needed = ("methods/explicit", "methods/rodas5p", "memory", "samples")
     needed += ("events/location", "events/excursions", "events/near_side")
     assert {f"integrate/{name}.py" for name in needed} <= set(source_files())
+
+
+def test_what_an_imported_constant_is_made_of_belongs_to_them(tmp_path, monkeypatch):
+    """In any number of steps, by any name; what else those files have does not count."""
+    files = {
+        "native/integrate/advance.py": "from ...outer import A, helper as h\n",
+        "native/integrate/start.py": "from .. import near\n",
+        "native/integrate/workspace.py": "import math\n",
+        "native/machine/export.py": "def exported():\n    return 1\n",
+        "native/near.py": "K = 1\n",
+        "outer.py": "from .inner import B as C, unused\nfrom .third import f\n"
+        "from .other import X\n"
+        "A = 2 * D\nD = C + 1\ndef helper(x):\n    return f(x)\ndef another():\n    return X\n",
+        "inner.py": "from .last import B\n",
+        "last.py": "B = 1.0\n",
+        "third.py": "def f(x):\n    return x\n",
+        "other.py": "X = 1\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.setattr(ship, "HERE", tmp_path / "native")
+    names = {(tmp_path / "native" / name).resolve() for name in ship.source_files()}
+    assert names == {tmp_path / name for name in files} - {tmp_path / "other.py"}
 
 
 def changed(**entries):

@@ -15,11 +15,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from places import SUPPORT
+from scipy import stats
 from sweep_examples import experiment, loop, same
 
 from nlctl.analysis.robustness import (
     Requirement,
+    Space,
     Spec,
+    Uncertain,
     always,
     in_band,
     independent,
@@ -249,6 +252,21 @@ def test_another_design_is_refused_with_what_differs(made, design, tmp_path, cha
     with pytest.raises(StoreError, match=place):
         sweep(made, replace(design, **changes), tmp_path, resume=True)
     assert load(tmp_path).complete
+
+
+def test_another_histogram_is_another_law(tmp_path):
+    """With the same ends, quartiles and median: mass has moved from one eighth to the next."""
+
+    def drawn(moved):
+        shares = [100, 50 + moved, 50 - moved, 100, 100]
+        law = stats.rv_histogram((shares, [0.5, 1.0, 1.25, 1.5, 2.0, 2.5]), density=False)
+        space = Space(quantities=(Uncertain(name="lag.rate", law=law()),))
+        return prepare(experiment(space=space))
+
+    one, other = drawn(0), drawn(25)
+    sweep(one, independent(one.experiment.space, 4, 1), tmp_path)
+    with pytest.raises(StoreError, match=r"space\.lag\.rate\.content was"):
+        sweep(other, independent(other.experiment.space, 4, 1), tmp_path, resume=True)
 
 
 def test_a_study_may_say_what_else_identifies_it(made, design, tmp_path):
