@@ -55,7 +55,7 @@ def _evaluate_away(rhs, task, lanes, w, x, dx):
 @numba.njit(**INNER)
 def _turn_back(task, lanes, w):
     """Have lanes that have looked behind a condition look back; return whether there are any."""
-    # What carries a memory along may jump there: that is no rate of it.
+    # What carries a memory along may jump there, and a jump says nothing of a rate.
     any_turns = False
     for j in range(lanes.size):
         if w.h[j] > 0.0 and _crosses(w, task.rows.declared, task.rows.guarded, j):
