@@ -20,7 +20,7 @@ RANGE = 36.0  # e^-36 is less than rounding
 LEADS = 8.0  # what a step may lead through: e^-8 of a pulse is seen
 UNEXAMINED = 2.0  # what an argument moves by in a step that is not examined
 SHORTER = 0.3  # part to be tried of a step that is too long
-ITSELF, AREA = 0, -1  # kinds; others are exponents
+ITSELF, AREA, WAVE = 0, -1, -2  # kinds; others are exponents
 _HIGH = 6  # powers from which on a function is as good as 0 around the root of what it is of
 # what functions are measured by, in arguments; erf(6) is 1
 _FACTORS = {
@@ -28,6 +28,7 @@ _FACTORS = {
     "erf": 6.0, "erfc": 6.0,
 }  # fmt: skip
 _SHARP = (*_FACTORS, "arctan", "logaddexp")
+_WAVE = LEADS / (0.5 * math.pi)  # of a sine inside: a step leads through a quarter of it
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class SharpArgument:
 
     expr: Expr
     # ``ITSELF``: it is the number; ``AREA``: twice its arsinh is, as of what has the tails of
-    # 1 / x; an exponent: that times the logarithm of its size
+    # 1 / x; ``WAVE``: it is, and nothing is flat anywhere; an exponent: that times the logarithm
+    # of its size
     kind: int
 
 
@@ -61,7 +63,18 @@ def sharp_arguments(graph: Graph, nodes: Iterable[Expr]) -> tuple[SharpArgument,
             if base.varies and (divides or exponent >= _HIGH) and _is_gentle(base):
                 powers[base] = max(powers.get(base, 0), exponent)
     known = (SharpArgument(graph.number(base), exponent) for base, exponent in powers.items())
-    return (*arguments, *known)
+    measured = (*arguments, *known)
+    return (*measured, *_waves(graph, [argument.expr for argument in measured]))
+
+
+def _waves(graph: Graph, arguments: Iterable[Expr]) -> dict[SharpArgument, None]:
+    """Return by what the waves among arguments are measured: a few values do not show one."""
+    factor = graph.const(_WAVE)
+    return {
+        SharpArgument(graph.op("mul", factor, graph.number(node.args[0])), WAVE): None
+        for node in needed(arguments)
+        if node.op in ("sin", "cos", "tan") and node.varies
+    }
 
 
 def _is_gentle(base: Expr) -> bool:

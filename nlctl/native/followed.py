@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER, UNEXAMINED
+from ..expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER, UNEXAMINED, WAVE
 from .compiled import Compiled
 from .machine.evaluations import prepared_parameters
 from .machine.routine import Routine
@@ -44,10 +44,9 @@ def followed(compiled: Compiled, p: np.ndarray) -> Callable[..., float] | None:
 def _part(kind: int, places: np.ndarray, values: np.ndarray) -> float:
     """Return up to which part of a step an argument with these values may be followed."""
     near, far = np.min(np.abs(values)), np.max(np.abs(values))
-    calm = (
-        np.ptp(values) < UNEXAMINED if kind == ITSELF else max(kind, 1) * (far - near) < 0.1 * near
-    )
-    if calm and (kind == ITSELF or abs(values.sum()) >= values.size * near):  # of one sign
+    is_number = kind in (ITSELF, WAVE)
+    calm = np.ptp(values) < UNEXAMINED if is_number else max(kind, 1) * (far - near) < 0.1 * near
+    if calm and (is_number or abs(values.sum()) >= values.size * near):  # of one sign
         return 1.0
     least, most = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
     at, extreme = _vertices(places, values)
@@ -78,6 +77,8 @@ def _vertices(places: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _measured(kind: int, least: Any, most: Any) -> tuple[Any, Any]:
     """Return between which measures a function is whose argument is between two numbers."""
+    if kind == WAVE:
+        return least, most
     if kind == ITSELF:
         lower, upper = least, most
     elif kind == AREA:

@@ -18,23 +18,23 @@ AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill w.memories with the rates at which memories would be carried along."""
     # A difference over a small part of the step: its error moves the turning point by so little
-    # that the turning value does not change. Where functions of t alone jump, it is taken
-    # backwards. Where a break point lies in between, it says nothing: a relay is about to jump.
-    ahead, memories = w.ahead, w.memories
+    # that the turning value does not change. Where functions of t alone jump, or a condition lies
+    # ahead, it is taken backwards. Where a break point that a block declares lies in between, it
+    # says nothing: a relay is about to jump.
+    ahead, memories, h = w.ahead, w.memories, w.h
     for j in range(lanes.size):
         w.t[j] = ahead.begin[j] + AHEAD * max(lanes[j].h, 1e-12)
         if w.t[j] > lanes[j].left:
             w.t[j] = ahead.begin[j] - AHEAD * max(lanes[j].last, 1e-12)
-        away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
-        w.h[j] = away
-        for i in range(x.shape[0]):
-            ahead.x[i, j] = x[i, j] + away * dx[i, j]
-    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
+        h[j] = w.t[j] - ahead.begin[j]  # what is left of it after rounding
+    _evaluate_away(rhs, task, lanes, w, x, dx)
+    if _turn_back(task, lanes, w):
+        _evaluate_away(rhs, task, lanes, w, x, dx)
     for i in range(memories.m.shape[0]):
         for j in range(lanes.size):
             change = ahead.m[i, j] - memories.m[i, j]  # exactly 0 where the memory stands still
-            memories.slope[i, j] = change / (w.h[j] if w.h[j] < 0.0 else max(w.h[j], 1e-300))
-            if w.h[j] < 0.0:
+            memories.slope[i, j] = change / (h[j] if h[j] < 0.0 else max(h[j], 1e-300))
+            if h[j] < 0.0:
                 change = -change
             noise = 1e-15 * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
             known = change == 0.0 or (abs(change) > noise and not _is_between(task, w, j))
@@ -44,9 +44,38 @@ def memory_rates(rhs, task, lanes, w, x, dx):
 
 
 @numba.njit(**INNER)
+def _evaluate_away(rhs, task, lanes, w, x, dx):
+    """Fill w.ahead with what the equations are at times away by w.h."""
+    for j in range(lanes.size):
+        w.t[j] = w.ahead.begin[j] + w.h[j]
+        for i in range(x.shape[0]):
+            w.ahead.x[i, j] = x[i, j] + w.h[j] * dx[i, j]
+    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g, w.ahead.m)
+
+
+@numba.njit(**INNER)
+def _turn_back(task, lanes, w):
+    """Have lanes that have looked behind a condition look back; return whether there are any."""
+    # What carries a memory along may jump there, and a jump says nothing of a rate.
+    any_turns = False
+    for j in range(lanes.size):
+        if w.h[j] > 0.0 and _crosses(w, task.rows.declared, task.rows.guarded, j):
+            w.h[j] = -AHEAD * max(lanes[j].step, 1e-12)
+            any_turns = True
+    return any_turns
+
+
+@numba.njit(**INNER)
 def _is_between(task, w, j):
-    """Whether a break point that a block declares lies between a state and the look ahead of it."""
-    for i in range(task.rows.bending):  # noqa: SIM110 (no generators in machine code)
+    """Whether a break point lies between a state and the look away from it."""
+    declared, guarded = task.rows.declared, task.rows.guarded
+    return _crosses(w, 0, task.rows.bending, j) or _crosses(w, declared, guarded, j)
+
+
+@numba.njit(**INNER)
+def _crosses(w, first, end, j):
+    """Whether one of these functions has another sign where it was looked."""
+    for i in range(first, end):  # noqa: SIM110 (no generators in machine code)
         if opposite(w.events.g[i, j], w.ahead.g[i, j]):
             return True
     return False

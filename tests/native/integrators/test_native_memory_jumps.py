@@ -152,3 +152,19 @@ def test_behind_a_delay(name, heights, end):
     jumps = [(t + 0.15, a) for t, a in zip(TIMES, heights, strict=True)]
     wanted = replay(ACTUATORS[name], extremes(jumps, float, end + 0.15))
     assert run.outputs[0, -1] == pytest.approx(wanted, abs=2e-7)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+@pytest.mark.parametrize("rtol", np.logspace(-11, -6, 11))
+def test_behind_a_condition_of_a_state(method, rtol):
+    """u = 1.5 (x % 1) falls by 1.5: a stop of 0.5, carried along, is at -0.5, and u back at 0."""
+    flow = ct.nlsys(
+        lambda t, x, u, params: [1.0], lambda t, x, u, params: 1.5 * (x[0] % 1.0),
+        inputs=0, outputs=["u"], states=1, name="saw",
+    )  # fmt: skip
+    loop = nlctl.interconnect({"saw": flow, "stop": nlctl.actuators.Stop(r=0.5)}, outputs=["v"])
+    times = np.r_[0.0, np.arange(1, 31) + 0.2]
+    run = nlctl.input_output_response(
+        loop, times, 0, 0, method=method, rtol=rtol, atol=rtol / 100, squeeze=True
+    )
+    np.testing.assert_allclose(run.outputs[1:], -0.2, rtol=0, atol=1e-4)

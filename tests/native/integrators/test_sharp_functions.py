@@ -7,6 +7,7 @@ import control as ct
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.special import gammaln, ive
 
 import nlctl
 from nlctl.expressions.conditions import switching_function
@@ -82,6 +83,44 @@ def test_high_powers_of_a_wave(method):
     run = nlctl.input_output_response(compared, [0, 0.2], 0, [0.0, 0.0], method=method)
     grid = np.linspace(0, 0.2, 2_000_001)
     assert run.states[1, -1] == pytest.approx(0.2 * np.mean(above(grid) > 0), abs=1e-6)
+
+
+@pytest.mark.parametrize("how", WAYS, ids=IDS)
+def test_sharp_functions_of_waves(how):
+    """exp(k (cos z - 1)) is a pulse in each wave of z' = 1: 2 pi I_0(k) exp(-k) each."""
+    run = nlctl.input_output_response(
+        flowing(lambda z: np.exp(1e5 * (np.cos(z) - 1))), [0, 20 * np.pi], 0, [np.pi, 0.0],
+        squeeze=True, **how,
+    )  # fmt: skip
+    assert run.outputs[-1] == pytest.approx(10 * 2 * np.pi * ive(0, 1e5), rel=1e-4)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+def test_powers_of_waves_are_high_at_crests(method):
+    """The integral of cos^2000 over a half wave is pi binom(2000, 1000) / 2^2000."""
+    run = nlctl.input_output_response(
+        flowing(lambda z: np.cos(z) ** 2000), [0, 30 * np.pi], 0, [0.5 * np.pi, 0.0],
+        squeeze=True, method=method,
+    )  # fmt: skip
+    half_wave = np.pi * np.exp(gammaln(2001) - 2 * gammaln(1001) - 2000 * np.log(2))
+    assert run.outputs[-1] == pytest.approx(30 * half_wave, rel=1e-6)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+def test_waves_of_members(method):
+    """Members of other frequencies, each with all of its pulses, from trough to trough."""
+    train = ct.nlsys(
+        lambda t, x, u, p: [1.0, np.exp(1e5 * (np.cos(p["w"] * x[0]) - 1))],
+        lambda t, x, u, p: x[1], inputs=0, outputs=1, states=2, params={"w": 1.0}, name="train",
+    )  # fmt: skip
+    w = np.arange(3, 40) + 0.5  # half a wave more than whole ones in 2 pi
+    runs = nlctl.ensemble_response(
+        train, [0, 2 * np.pi], 0, [0.1, 0.0], params={"w": w}, keep=["y[0]"], method=method
+    )
+    pulses = np.floor(w + 0.1 * w / (2 * np.pi))
+    near = np.abs(np.cos(0.1 * w + 2 * np.pi * w) - 1) < 1e-3  # it ends within one
+    known = pulses * 2 * np.pi * ive(0, 1e5) / w
+    np.testing.assert_allclose(runs.signals["y[0]"][~near, -1], known[~near], rtol=1e-5)
 
 
 def test_members_of_an_ensemble():

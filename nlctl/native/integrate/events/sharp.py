@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ....expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER, UNEXAMINED
+from ....expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER, UNEXAMINED, WAVE
 from ...machine.address import call_out
 from ..control import shorten
 from ..evaluate import inputs_at, on_this_side
@@ -98,6 +98,8 @@ def _is_calm(task, lane, w, j):
             is_far = max(before, end) + _WITHIN * most < -RANGE
             is_far |= min(before, end) - _WITHIN * most > RANGE
             calm &= most <= UNEXAMINED or is_far
+        elif kind == WAVE:
+            calm &= most <= UNEXAMINED
         else:
             nearest = min(abs(end), abs(before)) + (1.0 if kind == AREA else 0.0)
             calm &= max(kind, 1) * most <= UNEXAMINED * nearest
@@ -167,11 +169,15 @@ def _any_moves(task, w, j):
         for n in range(1, 5):
             least, most = min(least, w.sharp.at[n, i, j]), max(most, w.sharp.at[n, i, j])
         kind, apart = task.sharp.kinds[i], most - least
-        if kind != ITSELF:  # between two of the values it may be nearer to 0
+        if kind not in (
+            ITSELF,
+            WAVE,
+        ):  # between two of the values it may be nearer to 0, and farther
             nearest = max(max(least, -most) - apart, 0.0)
             if nearest > max(kind, 1) * apart:
                 continue
-            apart = _measure(kind, max(most, -least)) - max(_measure(kind, nearest), -RANGE)
+            farthest = max(most, -least) + apart
+            apart = _measure(kind, farthest) - max(_measure(kind, nearest), -RANGE)
         if apart > _AIM * LEADS:
             return 1
     return 0
@@ -180,7 +186,7 @@ def _any_moves(task, w, j):
 @numba.njit(**INNER)
 def _measure(kind, value):
     """Return by what a function is measured whose argument has a value."""
-    if kind == ITSELF:
+    if kind in (ITSELF, WAVE):
         return value
     size = abs(value)
     if kind == AREA:
@@ -227,7 +233,7 @@ def _followed(task, w, i, j):
 @numba.njit(**INNER)
 def _blurred(kind, nearest, wrong):
     """Return by how much a measure may be wrong where its argument is nearest to 0."""
-    if kind == ITSELF:
+    if kind in (ITSELF, WAVE):
         return wrong
     return _measure(kind, nearest + wrong) - max(_measure(kind, nearest), -RANGE)
 
@@ -235,6 +241,8 @@ def _blurred(kind, nearest, wrong):
 @numba.njit(**INNER)
 def _is_flat(kind, least, most):
     """Whether a function is flat wherever its argument lies between two numbers."""
+    if kind == WAVE:
+        return False
     if kind in (ITSELF, AREA):
         return _measure(kind, least) > RANGE or _measure(kind, most) < -RANGE
     nearest = max(least, -most, 0.0)
@@ -244,7 +252,8 @@ def _is_flat(kind, least, most):
 @numba.njit(**INNER)
 def _led(kind, newton, at, until, lowest, highest):
     """Return how far a polynomial leads within the range, up to a part of a step."""
-    least, most, before = RANGE, -RANGE, 0.0
+    reach = np.inf if kind == WAVE else RANGE
+    least, most, before = reach, -reach, 0.0
     for n in range(_POINTS + 4):
         x = n / _POINTS
         if n > _POINTS:
@@ -253,6 +262,6 @@ def _led(kind, newton, at, until, lowest, highest):
             value = polynomial_at(newton, at, x)
             if kind > 0 and opposite(before, value):
                 least = -RANGE  # it goes through 0
-            measure = min(max(_measure(kind, value), -RANGE), RANGE)
+            measure = min(max(_measure(kind, value), -reach), reach)
             least, most, before = min(least, measure), max(most, measure), value
     return most - least
