@@ -12,6 +12,7 @@ from .state import INNER, opposite
 
 FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
+_NEARER = 1e-6  # the same of long steps, by Taylor's method
 
 
 @numba.njit(**INNER)
@@ -21,10 +22,11 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     # that the turning value does not change. Where functions of t alone jump, it is taken
     # backwards. Where a break point lies in between, it says nothing: a relay is about to jump.
     ahead, memories = w.ahead, w.memories
+    part = _NEARER if task.taylor.highest else AHEAD
     for j in range(lanes.size):
-        w.t[j] = ahead.begin[j] + AHEAD * max(lanes[j].h, 1e-12)
+        w.t[j] = ahead.begin[j] + part * max(lanes[j].h, 1e-12)
         if w.t[j] > lanes[j].left:
-            w.t[j] = ahead.begin[j] - AHEAD * max(lanes[j].last, 1e-12)
+            w.t[j] = ahead.begin[j] - part * max(lanes[j].last, 1e-12)
         away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
         w.h[j] = away
         for i in range(x.shape[0]):
