@@ -13,6 +13,7 @@ from .state import INNER, opposite
 FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 _NEARER = 1e-6  # the same of long steps, by Taylor's method
+_NEAREST = 1e-10  # and of a run
 
 
 @numba.njit(**INNER)
@@ -22,11 +23,10 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     # that the turning value does not change. Where functions of t alone jump, it is taken
     # backwards. Where a break point lies in between, it says nothing: a relay is about to jump.
     ahead, memories = w.ahead, w.memories
-    part = _NEARER if task.taylor.highest else AHEAD
     for j in range(lanes.size):
-        w.t[j] = ahead.begin[j] + part * max(lanes[j].h, 1e-12)
+        w.t[j] = ahead.begin[j] + _far(task, lanes[j].h)
         if w.t[j] > lanes[j].left:
-            w.t[j] = ahead.begin[j] - part * max(lanes[j].last, 1e-12)
+            w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
         away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
         w.h[j] = away
         for i in range(x.shape[0]):
@@ -43,6 +43,15 @@ def memory_rates(rhs, task, lanes, w, x, dx):
             memories.rate[i, j] = change if known else memories.rate_start[i, j]
             if lanes[j].quiet > 0:
                 memories.rate[i, j] = 0.0  # memories are committed step by step for a while
+
+
+@numba.njit(**INNER)
+def _far(task, step):
+    """Return how far to look ahead for the rate of a memory (s)."""
+    if task.taylor.highest == 0:
+        return AHEAD * max(step, 1e-12)
+    span = task.times[task.times.size - 1] - task.times[0]
+    return max(_NEARER * min(step, span), _NEAREST * span)
 
 
 @numba.njit(**INNER)

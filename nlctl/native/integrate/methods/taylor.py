@@ -191,12 +191,12 @@ def _look_inside(rhs, task, lanes, w):
             inside.looked[j], inside.foreseen[j] = 1.0 - _BEFORE * behind_event(task.rtol), 0.5
         wanted |= inside.looked[j] > 0.0
     away = 1.0
-    for _ in range(_PLACES + 1):
+    for n in range(_PLACES + 1):
         if wanted:
             _look_across(rhs, task, lanes, w)
         wanted, away = False, 0.1 * away
         for j in range(lanes.size):
-            if away > 0.1 ** (_PLACES + 1) and inside.wanted[j] and inside.looked[j] == 0.0:
+            if n < _PLACES and inside.wanted[j] and inside.looked[j] == 0.0:
                 inside.looked[j], wanted = 1.0 - away, True
 
 
