@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ParameterError
+from ...expressions.graph import Expr, needed
 from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.plan import Store
 from ..codegen.rewrite import rewritten
@@ -41,7 +42,8 @@ class Series:
     # members): the states' are in the first rows, then those of the switching functions.
     functions: tuple[Any, ...]
     layout: SeriesLayout
-    sides: np.ndarray  # (comparisons, 2): see `Recurrences.sides`
+    # (comparisons, 3): see `Recurrences.sides`, and whether memories have a part in it
+    sides: np.ndarray
 
     def parameters(self, p: np.ndarray, **settings: float) -> np.ndarray:
         """Return the `c` of parameter vectors, shape (parameters, members), and of `_SETTINGS`."""
@@ -86,7 +88,7 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
     switching, n = reading.program.events + read.conditions.rows, lowered.rows["x"]
     count = len(reading.program.memory)
     changing = range(n + switching + count, n + switching + 2 * count)
-    compared = [*changing, *(row for row, _ in recurrence.sides)]
+    compared = [*changing, *(row for row, *_ in recurrence.sides)]
     if is_jit_disabled():
         prepare, *functions = plain_series(
             lowered, recurrence, [*range(n, n + switching), *compared], layout
@@ -103,9 +105,21 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
             )
             for name, address in loaded.addresses.items()
         )  # fmt: skip
-    sides = np.array(recurrence.sides, dtype=np.int64).reshape(-1, 2)
+    memory = set(reading.program.memory)
+    sides = [(a, b, int(_reads(expr, memory))) for a, b, expr in recurrence.sides]
     return Series(
-        lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout, sides=sides
+        lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout,
+        sides=np.array(sides, dtype=np.int64).reshape(-1, 3),
+    )  # fmt: skip
+
+
+def _reads(expr: Expr, states: set[int]) -> bool:
+    """Return whether an expression is one of some states."""
+    leaves = (node for node in needed([expr]) if node.op == "leaf" and node.data[0] == "x")
+    return any(
+        start + step * i in states
+        for _, start, step, size in ((*leaf.data, leaf.size or 1) for leaf in leaves)
+        for i in range(size)
     )
 
 

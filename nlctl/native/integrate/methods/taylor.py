@@ -44,7 +44,7 @@ class TaylorMethod(NamedTuple):
 
     highest: int  # order, 0 for other methods
     functions: Places1
-    sides: Places2  # rows of comparisons, see `taylor.recurrences.Recurrences`
+    sides: Places2  # rows of comparisons, see `taylor.routine.Series`
     c: Reals2  # what the functions read besides their arguments
     compared: int  # whether a run may change to another method
     cost: float  # of a step, in explicit ones
@@ -64,7 +64,7 @@ class TaylorArrays(NamedTuple):
 
 OTHER_METHOD = with_table(
     TaylorMethod, highest=0, functions=np.zeros(0, dtype=np.int64),
-    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)), compared=0, cost=0.0,
+    sides=np.zeros((0, 3), dtype=np.int64), c=np.zeros((1, 1)), compared=0, cost=0.0,
 )  # fmt: skip
 
 
@@ -128,10 +128,13 @@ def _begins_at_jump(task, lane, terms, j):
     """Whether something compared is equal where the step begins, and is not right behind."""
     # The right-hand side may have another value there than on the side on which the solution goes
     # on, and with it the first coefficients: a step that leaves the place is tried first, once.
+    # What a memory takes part in is equal where it has just turned, and nothing jumps there.
     if lane.accepted and lane.last <= _shortest(task):
         return False
     for i in range(task.taylor.sides.shape[0]):
         side = task.taylor.sides[i, 1]
+        if task.taylor.sides[i, 2]:
+            continue
         if terms[0, side, j] == 0.0 and terms[task.taylor.highest - 1, side, j] != 0.0:
             return True
     return False
