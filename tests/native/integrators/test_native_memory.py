@@ -471,7 +471,8 @@ class TestExample2:
             )
         tail = abs(made.outputs[loop.system.output_index["e"], 10_000:]).max()
         assert tail == pytest.approx(0.09346875724, abs=1e-6)
-        assert made.statistics.events + made.statistics.turns == 15
+        assert made.statistics.events == 8
+        assert made.statistics.turns in (7, 8)  # one may be found in two steps
 
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_the_error_falls_with_the_tolerance(self, loop, method):
