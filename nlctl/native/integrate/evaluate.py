@@ -83,8 +83,14 @@ def evaluate(rhs, task, lanes, w, x, dx, g, m):
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, x, w.u, task.p, dx, g, m)
+    hold_memories(task, dx)
+
+
+@numba.njit(**INNER)
+def hold_memories(task, dx):
+    """Have memories stand still within a step."""
     for i in task.rows.memory:
-        for j in range(lanes.size):
+        for j in range(dx.shape[1]):
             dx[i, j] = 0.0
 
 

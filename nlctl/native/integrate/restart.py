@@ -12,6 +12,8 @@ from .state import INNER, opposite
 
 FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
+_NEARER = 1e-6  # the same of long steps, by Taylor's method
+_NEAREST = 1e-10  # and of a run
 
 
 @numba.njit(**INNER)
@@ -23,9 +25,9 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     # says nothing: a relay is about to jump.
     ahead, memories, h = w.ahead, w.memories, w.h
     for j in range(lanes.size):
-        w.t[j] = ahead.begin[j] + AHEAD * max(lanes[j].h, 1e-12)
+        w.t[j] = ahead.begin[j] + _far(task, lanes[j].h)
         if w.t[j] > lanes[j].left:
-            w.t[j] = ahead.begin[j] - AHEAD * max(lanes[j].last, 1e-12)
+            w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
         h[j] = w.t[j] - ahead.begin[j]  # what is left of it after rounding
     _evaluate_away(rhs, task, lanes, w, x, dx)
     if _turn_back(task, lanes, w):
@@ -44,25 +46,21 @@ def memory_rates(rhs, task, lanes, w, x, dx):
 
 
 @numba.njit(**INNER)
-def _evaluate_away(rhs, task, lanes, w, x, dx):
-    """Fill w.ahead with what the equations are at times away by w.h."""
-    for j in range(lanes.size):
-        w.t[j] = w.ahead.begin[j] + w.h[j]
+            w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
+        away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
+        w.h[j] = away
         for i in range(x.shape[0]):
-            w.ahead.x[i, j] = x[i, j] + w.h[j] * dx[i, j]
-    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g, w.ahead.m)
+            ahead.x[i, j] = x[i, j] + away * dx[i, j]
+    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
 
 
 @numba.njit(**INNER)
-def _turn_back(task, lanes, w):
-    """Have lanes that have looked behind a condition look back; return whether there are any."""
-    # What carries a memory along may jump there, and a jump says nothing of a rate.
-    any_turns = False
-    for j in range(lanes.size):
-        if w.h[j] > 0.0 and _crosses(w, task.rows.declared, task.rows.guarded, j):
-            w.h[j] = -AHEAD * max(lanes[j].step, 1e-12)
-            any_turns = True
-    return any_turns
+def _far(task, step):
+    """Return how far to look ahead for the rate of a memory (s)."""
+    if task.taylor.highest == 0:
+        return AHEAD * max(step, 1e-12)
+    span = task.times[task.times.size - 1] - task.times[0]
+    return max(_NEARER * min(step, span), _NEAREST * span)
 
 
 @numba.njit(**INNER)

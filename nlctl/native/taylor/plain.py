@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..codegen.interpret import interpreted_function
-from ..integrate.methods.taylor import FOLLOWED
+from ..integrate.methods.crossings import FOLLOWED
 from ..lower import Lowered
 from .folds import SeriesLayout
 from .recurrences import Fold, Recurrences
@@ -17,7 +17,7 @@ _Array = np.ndarray  # with a column for each member
 
 
 def plain_series(
-    lowered: Lowered, recurrence: Recurrences, switching: int, layout: SeriesLayout
+    lowered: Lowered, recurrence: Recurrences, compared: Sequence[int], layout: SeriesLayout
 ) -> tuple[Callable[..., None], ...]:
     """Return `prepare` and the functions of a step, as `steps` and `folds` have them in IR."""
     prepare, first, following, last = (
@@ -54,9 +54,8 @@ def plain_series(
         scale = tolerance(np.maximum(np.abs(x), np.abs(x_new)), c)
         largest[0] = np.max(np.abs(h * (dx - slope)) * scale + 0.0 * x_new, axis=0)
         largest[1] = np.max(np.abs(h ** (len(k) - 1) * k[-1, : len(x)]) * scale, axis=0)
-        n, sides = len(x), [row for row, _ in recurrence.sides]
         largest[2] = -1.0
-        for row in (*range(n, n + switching), *sides):
+        for row in compared:
             parts = np.abs(k[:-1, row]) * h ** np.arange(len(k) - 1)[:, None]
             doubt = parts[-2:].sum(axis=0) - FOLLOWED * parts.sum(axis=0)
             doubt = np.fmax(doubt, parts.sum(axis=0) - 2.0 * parts[0])

@@ -72,8 +72,9 @@ class Recurrences:
     folds: list[Fold]
     rows: dict[str, int]  # of every array
     # rows of ``"k"`` for each comparison: the difference of what is compared, and the first
-    # of its coefficients that is not 0; the same of what is 0 where `floor` and its like jump
-    sides: list[tuple[int, int]]
+    # of its coefficients that is not 0; the same of what is 0 where `floor` and its like jump;
+    # and what that is
+    sides: list[tuple[int, int, Expr]]
 
 
 def recurrences(
@@ -120,7 +121,7 @@ class _Reader:
     distances: dict[Expr, Expr] = field(default_factory=dict)
     # which sums there are, by their factors
     sums: dict[tuple[_Key, _Key], Expr] = field(default_factory=dict)
-    pairs: list[tuple[int, int]] = field(default_factory=list)  # see `Recurrences.sides`
+    pairs: list[tuple[int, int, Expr]] = field(default_factory=list)  # see `Recurrences.sides`
     waiting: list[tuple[Expr, bool]] = field(default_factory=list)
     first: list[Store] = field(default_factory=list)
     following: list[Store] = field(default_factory=list)
@@ -410,7 +411,7 @@ class _Reader:
         graph, zero, size = self.graph, self.graph.const(0.0), distance.size or 1
         row, term = self._take("k", size), self.term(distance)
         self.previous(distance)  # for its polynomial
-        self.pairs += [(self.before[distance] + i, row + i) for i in range(size)]
+        self.pairs += [(self.before[distance] + i, row + i, distance) for i in range(size)]
         before = graph.leaf("b", row, distance.size)
         now = graph.op(
             "select", graph.op("eq", before, zero), zero if term is None else term, before

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...errors import ParameterError
+from ...expressions.graph import Expr, needed
 from ...upstream.numba_internals import is_jit_disabled
+from ..codegen.plan import Store
 from ..codegen.rewrite import rewritten
 from ..diagram.parameters import length
 from ..equations.relays import relay_places
@@ -39,7 +41,8 @@ class Series:
     # members): the states' are in the first rows, then those of the switching functions.
     functions: tuple[Any, ...]
     layout: SeriesLayout
-    sides: np.ndarray  # (comparisons, 2): see `Recurrences.sides`
+    # (comparisons, 3): see `Recurrences.sides`, and whether memories have a part in it
+    sides: np.ndarray
 
     def parameters(self, p: np.ndarray, **settings: float) -> np.ndarray:
         """Return the `c` of parameter vectors, shape (parameters, members), and of `_SETTINGS`."""
@@ -66,14 +69,12 @@ def _check(reading: Reading) -> None:
         raise ParameterError(
             f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
         )
-    memories = [reading.system.state_labels[i] for i in reading.program.memory]
     relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
-    for what, places in (("memory", memories), ("an ideal relay", relays)):
-        if places:
-            raise ParameterError(
-                f"'{name}' has {what} ('{places[0]}'), which method='taylor' does not integrate: "
-                "use method='tsit5'"
-            )
+    if relays:
+        raise ParameterError(
+            f"'{name}' has an ideal relay ('{relays[0]}'), which method='taylor' does not "
+            "integrate: use method='tsit5'"
+        )
 
 
 def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
@@ -81,11 +82,15 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
     read = reading.equations_with(p[:, 0])
     lowered, recurrence = _lowered(reading, read, width)
     layout = _layout(lowered)
-    switching = reading.program.events + read.conditions.rows
+    switching, n = reading.program.events + read.conditions.rows, lowered.rows["x"]
+    count = len(reading.program.memory)
+    changing = range(n + switching + count, n + switching + 2 * count)
+    compared = [*changing, *(row for row, *_ in recurrence.sides)]
     if is_jit_disabled():
-        prepare, *functions = plain_series(lowered, recurrence, switching, layout)
+        prepare, *functions = plain_series(
+            lowered, recurrence, [*range(n, n + switching), *compared], layout
+        )
     else:
-        compared = [row for row, _ in recurrence.sides]
         steps = steps_text(lowered.rows["x"], switching, compared, layout)
         text = "\n".join([lowered.text, taylor_text(recurrence.folds, layout), steps])
         loaded = finished(text, ("prepare", *_STEP_FUNCTIONS))
@@ -97,9 +102,21 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
             )
             for name, address in loaded.addresses.items()
         )  # fmt: skip
-    sides = np.array(recurrence.sides, dtype=np.int64).reshape(-1, 2)
+    memory = set(reading.program.memory)
+    sides = [(a, b, int(_reads(expr, memory))) for a, b, expr in recurrence.sides]
     return Series(
-        lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout, sides=sides
+        lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout,
+        sides=np.array(sides, dtype=np.int64).reshape(-1, 3),
+    )  # fmt: skip
+
+
+def _reads(expr: Expr, states: set[int]) -> bool:
+    """Return whether an expression is one of some states."""
+    leaves = (node for node in needed([expr]) if node.op == "leaf" and node.data[0] == "x")
+    return any(
+        start + step * i in states
+        for _, start, step, size in ((*leaf.data, leaf.size or 1) for leaf in leaves)
+        for i in range(size)
     )
 
 
@@ -111,15 +128,41 @@ def _layout(lowered: Lowered) -> SeriesLayout:
     return SeriesLayout(rows=lowered.rows["k"], at=at, lanes=lowered.lanes, size=row)
 
 
+def _asked(reading: Reading, read: Any) -> dict[str, list[Store]]:
+    """Return what has coefficients: rates, switching functions, what memories would become.
+
+    Memories stand still within a step.  Behind what they would become there is room for its
+    derivative, which follows from it.
+    """
+    asked, zero = stores_of(read, ("dx", "g", "m")), read.graph.const(0.0)
+    memory, dx = set(reading.program.memory), list[Store]()
+    for store in asked["dx"]:
+        rows = range(store.row, store.row + store.size)
+        if memory.isdisjoint(rows):
+            dx.append(store)
+        else:
+            dx += [
+                replace(
+                    store, row=row, size=1,
+                    expr=zero if row in memory else read.graph.item(store.expr, k),
+                )
+                for k, row in enumerate(rows)
+            ]  # fmt: skip
+    first = reading.program.events + read.conditions.rows
+    become = [replace(store, array="g", row=first + store.row) for store in asked["m"]]
+    count = len(memory)
+    derivatives = [Store(array="g", row=first + count + i, expr=zero, size=1) for i in range(count)]
+    return {"dx": dx, "g": asked["g"] + become + derivatives}
+
+
 def _lowered(reading: Reading, read: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = reading.program, reading.system.nstates or 0, reading.schedule.ninputs
-    asked = stores_of(read, ("dx", "g"))
-    stores, exact, graph = rewritten(read.graph, asked)
+    stores, exact, graph = rewritten(read.graph, _asked(reading, read))
     try:
         recurrence = recurrences(
             graph,
             stores,
-            {"x": n, "g": program.events + read.conditions.rows},
+            {"x": n, "g": program.events + read.conditions.rows + 2 * len(program.memory)},
             packed=width == 1,
         )
     except NoSeriesError as error:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 
 from ..codegen.ir.functions import applied
 from ..codegen.ir.text import Body, Module, Turns, Value, constant
-from ..integrate.methods.taylor import FOLLOWED
+from ..integrate.methods.crossings import FOLLOWED
 from .folds import WIDE, SeriesLayout
 
 _ZERO = Value("0", 0, "i")

@@ -40,11 +40,11 @@ _COMPARED = with_fields(OTHER_METHOD, compared=1)
 
 def may_turn(reading: Reading) -> bool:
     """Whether runs of a diagram may continue by Taylor's method."""
-    # Memories and delays have no coefficients, and where clocks end the steps a run can be
-    # resumed at a sample, and knows nothing of the steps before. The passes of a loop that end at a
-    # tolerance are long, and hardly differ.
+    # Delays have no coefficients, and where clocks end the steps a run can be resumed at a sample,
+    # and knows nothing of the steps before. The passes of a loop that end at a tolerance are long,
+    # and hardly differ.
     program, lines = reading.program, reading.schedule.lines
-    never = program.memory or program.sampled or lines or reading.equations.graph.of_passes
+    never = program.sampled or lines or reading.equations.graph.of_passes
     return bool(reading.system.nstates) and not never
 
 

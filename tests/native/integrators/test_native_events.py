@@ -211,7 +211,7 @@ class TestDeadZone:
         np.testing.assert_allclose(made.states[2], exact, atol=1e-9)
         assert made.statistics.events == 12
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_the_published_slopes_match_quadrature(self, method):
         """x' = -x + v with slopes that depend on the input."""
         zone, end = nlctl.DeadZone(), 9.0
@@ -365,7 +365,7 @@ class TestRelay:
 class TestIdealRelay:
     """Switching without hysteresis."""
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_a_mass_under_bang_bang_keeps_its_energy(self, method):
         """x'' = -sign x: arcs of parabolas, |x| + x'^2 / 2 = 0.5, period 4."""
         loop = joined(mass=Mass(), relay=Sign())
@@ -376,7 +376,7 @@ class TestIdealRelay:
         np.testing.assert_allclose(x[::8], 0.5, atol=1e-6)
         assert made.statistics.events == 6
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_sliding_ends_with_a_status(self, method):
         """x' = 0.5 - 1.5 sign x slides from t = 0.5 on: no run may take that for a motion."""
         loop = joined(plant=Lag(a=0.0, gain=1.5, c=0.5), relay=Sign())
@@ -389,7 +389,7 @@ class TestIdealRelay:
         else:
             assert made.statistics.status is Status.CHATTERING
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_a_chattering_memory_ends_with_a_status(self, method):
         """A relay with memory whose thresholds coincide: x stays at them, or the run ends."""
         loop = joined(plant=Lag(a=0.0, c=0.5), relay=Relay(on=0.0, off=0.0, height=1.0))

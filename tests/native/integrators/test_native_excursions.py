@@ -58,7 +58,7 @@ BOGACKI_SHAMPINE = Tableau(  # with two stages inside a step, and a cubic polyno
     name="bs3", order=3, a=((1 / 2,), (0.0, 3 / 4), (2 / 9, 1 / 3, 4 / 9)),
     c=(0.0, 1 / 2, 3 / 4, 1.0), error=(-5 / 72, 1 / 12, 1 / 9, -1 / 8), stable=2.5,
 )  # fmt: skip
-METHODS = ["tsit5", "rodas5p", "auto"]
+METHODS = ["tsit5", "rodas5p", "taylor", "auto"]
 amplitudes, frequencies = st.floats(0.1, 10), st.floats(0.05, 100)
 beyond = st.floats(-6, -0.03).map(lambda power: 10.0**power)  # the band, in amplitudes
 

@@ -227,7 +227,7 @@ class TestLoop:
         assert not made.outputs[2].any()
         assert made.statistics.events == made.statistics.turns == 0
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_the_lag_behind_the_play_matches_quadrature(self, driven, method):
         """y(20) of y' = v - y, integrated between events that are known in closed form."""
         spec, u_of, params = wave(a=1.7, d=0.05)
@@ -460,7 +460,7 @@ class TestExample2:
 
     FIGURES = {"x1": 0.155675746380, "x2": -0.02691235195, "zeta": 1.53306191709}
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_it_reaches_the_figures(self, loop, method):
         """x1, x2 and zeta at 20 s and the tail's largest error, computed independently."""
         times = np.linspace(0, 20, 20_001)
@@ -471,9 +471,10 @@ class TestExample2:
             )
         tail = abs(made.outputs[loop.system.output_index["e"], 10_000:]).max()
         assert tail == pytest.approx(0.09346875724, abs=1e-6)
-        assert made.statistics.events + made.statistics.turns == 15
+        assert made.statistics.events == 8
+        assert made.statistics.turns in (7, 8)  # one may be found in two steps
 
-    @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_the_error_falls_with_the_tolerance(self, loop, method):
         """In every state at every time; at most 1e-9 at rtol 1e-10 by the explicit method."""
         times = np.linspace(0, 20, 41)

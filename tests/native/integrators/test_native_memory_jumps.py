@@ -115,7 +115,7 @@ ends = st.floats(0.05, 1.6).filter(lambda t: min(abs(t - s) for s in (*TIMES, 0.
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ACTUATORS)
-@pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
 @given(heights=heights, end=ends)
 @example(heights=(-0.15, 0.01, 0.01), end=0.52)
 @settings(max_examples=10)

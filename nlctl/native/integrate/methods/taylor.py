@@ -21,18 +21,17 @@ from ...machine.address import (
     call_step,
     call_values,
 )
-from ..evaluate import input_rates, inputs_at
+from ..evaluate import hold_memories, input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
-from .dips import first_dip, lacking, value_and_slope
+from .carried import becoming, fill_slopes, first_turn, turns_inside, turns_until
+from .crossings import LOOKS, first_crossing, is_followed, root_of, side_left_to
+from .dips import value_and_slope
 
 SLOPES = 2  # slopes at both ends of a step
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
-FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
-_LOOKS = 16  # parts of a step
-_TURNS = 5  # attempts at where a polynomial is least
 _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
@@ -45,7 +44,7 @@ class TaylorMethod(NamedTuple):
 
     highest: int  # order, 0 for other methods
     functions: Places1
-    sides: Places2  # rows of comparisons, see `taylor.recurrences.Recurrences`
+    sides: Places2  # rows of comparisons, see `taylor.routine.Series`
     c: Reals2  # what the functions read besides their arguments
     compared: int  # whether a run may change to another method
     cost: float  # of a step, in explicit ones
@@ -65,7 +64,7 @@ class TaylorArrays(NamedTuple):
 
 OTHER_METHOD = with_table(
     TaylorMethod, highest=0, functions=np.zeros(0, dtype=np.int64),
-    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)), compared=0, cost=0.0,
+    sides=np.zeros((0, 3), dtype=np.int64), c=np.zeros((1, 1)), compared=0, cost=0.0,
 )  # fmt: skip
 
 
@@ -96,6 +95,7 @@ def expand(task, lanes, w):
     call_growth(series[_GROWTH], w.x, task.taylor.c, taylor.terms, taylor.largest)
     for j in range(lanes.size):
         lane = lanes[j]
+        fill_slopes(task, w, j)
         if taylor.expanded[j] == 0 and lane.status == RUNNING and _lacks_terms(task, w, j):
             lane.status = METHOD if task.alone else STIFF
         if taylor.expanded[j] == 0 and task.fixed == 0.0:
@@ -128,10 +128,13 @@ def _begins_at_jump(task, lane, terms, j):
     """Whether something compared is equal where the step begins, and is not right behind."""
     # The right-hand side may have another value there than on the side on which the solution goes
     # on, and with it the first coefficients: a step that leaves the place is tried first, once.
+    # What a memory takes part in is equal where it has just turned, and nothing jumps there.
     if lane.accepted and lane.last <= _shortest(task):
         return False
     for i in range(task.taylor.sides.shape[0]):
         side = task.taylor.sides[i, 1]
+        if task.taylor.sides[i, 2]:
+            continue
         if terms[0, side, j] == 0.0 and terms[task.taylor.highest - 1, side, j] != 0.0:
             return True
     return False
@@ -158,7 +161,7 @@ def _length(highest, largest, j):
 def taylor_attempt(rhs, task, lanes, w):
     """Try a step in all lanes: fill w.x_new, the slope there, the event functions, the error."""
     series, dx = task.taylor.functions, w.k[w.k.shape[0] - 1]
-    if task.rows.switching:
+    if task.rows.switching or task.rows.memory.size:
         _aim(task, lanes, w)
     for j in range(lanes.size):
         w.h[j], w.hh[j] = lanes[j].step, lanes[j].step
@@ -167,6 +170,7 @@ def taylor_attempt(rhs, task, lanes, w):
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.events.g, w.memories.m)
+    hold_memories(task, dx)
     call_judge(
         series[_JUDGE], w.h, w.x, w.x_new, w.ahead.dx, dx, task.taylor.c, w.taylor.terms,
         w.taylor.largest,
@@ -190,12 +194,12 @@ def _look_inside(rhs, task, lanes, w):
             inside.looked[j], inside.foreseen[j] = 1.0 - _BEFORE * behind_event(task.rtol), 0.5
         wanted |= inside.looked[j] > 0.0
     away = 1.0
-    for _ in range(_PLACES + 1):
+    for n in range(_PLACES + 1):
         if wanted:
             _look_across(rhs, task, lanes, w)
         wanted, away = False, 0.1 * away
         for j in range(lanes.size):
-            if away > 0.1 ** (_PLACES + 1) and inside.wanted[j] and inside.looked[j] == 0.0:
+            if n < _PLACES and inside.wanted[j] and inside.looked[j] == 0.0:
                 inside.looked[j], wanted = 1.0 - away, True
 
 
@@ -210,11 +214,18 @@ def _aim(task, lanes, w):
         lane, first = lanes[j], 1.0
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
             if _meets(task, w, i, w.ahead.g[i, j], j):
-                part = _behind(task, lane, i, _root(task, w, i, lane.step, j))
+                ends = w.events.g_start[i, j], w.ahead.g[i, j]
+                root = root_of(
+                    task.taylor.highest - 1, lane.step, w.taylor.terms, w.x.shape[0] + i, ends,
+                    _rest(task, i), j,
+                )  # fmt: skip
+                part = _behind(task, lane, i, root)
                 if part > _BRIEF or i >= task.rows.declared:
                     first = min(first, part)
             elif i < task.rows.declared and opposite(w.events.g_start[i, j], w.ahead.g[i, j]):
                 first = min(first, _farthest(task, w, i, lane.step, j))
+        if lane.tries == 0 and lane.across == 0:
+            first = min(first, first_turn(task, lane, w, j))
         if 0.0 < first < 1.0:
             lane.step *= first
             lane.ends = 0
@@ -227,10 +238,10 @@ def _farthest(task, w, i, h, j):
     # it is behind nowhere.
     p, row, start = task.taylor.highest - 1, w.x.shape[0] + i, w.events.g_start[i, j]
     part, most = 1.0, abs(start) + SMALL_KINK * task.atol
-    for n in range(1, _LOOKS):
-        f = value_and_slope(p, n / _LOOKS * h, w.taylor.terms, row, j)[0]
+    for n in range(1, LOOKS):
+        f = value_and_slope(p, n / LOOKS * h, w.taylor.terms, row, j)[0]
         if abs(f) > most and not opposite(start, f):
-            part, most = n / _LOOKS, abs(f)
+            part, most = n / LOOKS, abs(f)
     return part
 
 
@@ -263,24 +274,6 @@ def _rest(task, i):
 
 
 @numba.njit(**INNER)
-def _root(task, w, i, h, j):
-    """Return the part of a step h at which the polynomial of an event function is 0."""
-    low, high, row, p = 0.0, 1.0, w.x.shape[0] + i, task.taylor.highest - 1
-    f_low, f_high = w.events.g_start[i, j], w.ahead.g[i, j]
-    for n in range(60):
-        part = f_low / (f_low - f_high)
-        middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
-        f = value_and_slope(p, middle * h, w.taylor.terms, row, j)[0]
-        if opposite(f, -f_low):
-            low, f_low = middle, f
-        else:
-            high, f_high = middle, f
-        if high - low < 0.1 * _rest(task, i) * high:
-            break
-    return high
-
-
-@numba.njit(**INNER)
 def events_at(task, lanes, w, g):
     """Fill `g` with the polynomials of the switching functions at w.inside.part of the steps."""
     for j in range(lanes.size):
@@ -310,7 +303,7 @@ def _compare(task, lane, w, j):
     # ``foreseen`` becomes the first part of the step at which it is, and ``looked`` where it is
     # farthest there, 0 if nothing is; below 0 if that is more than one comparison. Before an event,
     # if there is one: it is located by itself. What changes so fast that its polynomial says little
-    # asks for a shorter step as well. Polynomials are looked at in `_LOOKS` places, unless their
+    # asks for a shorter step as well. Polynomials are looked at in `LOOKS` places, unless their
     # terms together are less than the first. A shorter step is not asked for without end: what
     # begins so near to a kink that rounding cannot tell may go through it.
     events, inside, taylor = w.events, w.inside, w.taylor
@@ -325,23 +318,29 @@ def _compare(task, lane, w, j):
         if _meets(task, w, i, now, j):
             part = min(max(before / (before - now), 0.0), 1.0)
             until = min(until, lane.low / lane.step if lane.tries else part)
+    until = turns_until(task, lane, w, until, j)
+    again = turns_inside(task, w, until, j)
+    if again < 1.0:
+        inside.looked[j], inside.foreseen[j] = -1.0, again
     for i in range(task.rows.switching):
-        if not _is_followed(p, w.h[j], taylor.terms, n + i, j):
+        if not is_followed(p, w.h[j], taylor.terms, n + i, j):
             inside.looked[j], inside.foreseen[j] = -1.0, 0.5
         elif not opposite(events.g_start[i, j], events.g[i, j]):
             side = events.g_start[i, j]
+            if side == 0.0:
+                side = side_left_to(p, taylor.terms, n + i, j)
             if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
                 side = 1.0
-            first, farthest = _crossing(
+            first, farthest = first_crossing(
                 p, w.h[j], taylor.terms, n + i, side, until, taylor.shifted, j
             )
             if first < until:  # a step that ends there has an event
                 inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
     for i in range(task.taylor.sides.shape[0]):
         first, farthest, row = 0.5, -1.0, task.taylor.sides[i, 0]
-        if _is_followed(p, w.h[j], taylor.terms, row, j):
+        if is_followed(p, w.h[j], taylor.terms, row, j):
             side = taylor.terms[p, task.taylor.sides[i, 1], j]
-            first, farthest = _crossing(
+            first, farthest = first_crossing(
                 p, w.h[j], taylor.terms, row, side, until, taylor.shifted, j
             )
         if first < until:
@@ -365,65 +364,6 @@ def _ends_at_event(task, lane, w, j):
 
 
 @numba.njit(**INNER)
-def _is_followed(highest, h, terms, row, j):
-    """Whether a polynomial's terms have become small at h: its last two add little to the rest."""
-    total, power, last = abs(terms[0, row, j]), 1.0, 0.0
-    for k in range(1, highest + 1):
-        power *= h
-        part = abs(power * terms[k, row, j])
-        total += part
-        if k >= highest - 1:
-            last += part
-    return not last > FOLLOWED * total  # NaN is found elsewhere
-
-
-@numba.njit(**INNER)
-def _turning(p, h, terms, row, ends, slopes, j):
-    """Return about where a polynomial's slope is 0, between two places where its signs differ."""
-    (low, high), (first, last), least = ends, slopes, 0.0
-    for _ in range(_TURNS):
-        least = low + first / (first - last) * (high - low)
-        slope = value_and_slope(p, least * h, terms, row, j)[1]
-        if opposite(slope, first):
-            high, last = least, slope
-        else:
-            low, first = least, slope
-    return least
-
-
-@numba.njit(**INNER)
-def _crossing(p, h, terms, row, side, until, shifted, j):
-    """Return where a polynomial is on another side first, 1 for nowhere, and where farthest."""
-    first, farthest, most, steep = 1.0, 1.0, 0.0, 0.0
-    side = 1.0 if side > 0.0 else -1.0
-    extent = abs(terms[p, row, j])
-    for k in range(p - 1, 0, -1):
-        extent = extent * h + abs(terms[k, row, j])
-    if extent * h < abs(terms[0, row, j]):
-        return first, farthest
-    fell, part = False, 0.0
-    for n in range(_LOOKS + 1):
-        before, part = part, n / _LOOKS
-        if before >= until:
-            break
-        value, slope = value_and_slope(p, part * h, terms, row, j)
-        if fell and slope * side > 0.0:  # in between it is least where the slope is 0, about
-            least = _turning(p, h, terms, row, (before, part), (steep, slope), j)
-            under = value_and_slope(p, least * h, terms, row, j)[0] * side
-            lacks = lacking(p, least * h, extent * h, terms, row, j)
-            if under < lacks and least < until:
-                first, farthest, most = min(first, least), least, max(most, -under)
-        fell, steep = slope * side < 0.0, slope
-        if value * side < 0.0 and part < until:
-            first = min(first, part)
-            if -value * side > most:
-                farthest, most = part, -value * side
-    if first == 1.0:  # seen nowhere: there may be a dip between two of these places
-        first = farthest = first_dip(p, h, terms, row, side, until, extent * h, shifted, j)
-    return first, farthest
-
-
-@numba.njit(**INNER)
 def _look_across(rhs, task, lanes, w):
     """Forget what is on another side where the right-hand side is what it would be on this one."""
     # That is the case of a comparison whose result does not matter there, or not yet. Where a step
@@ -441,6 +381,7 @@ def _look_across(rhs, task, lanes, w):
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, w.ahead.x, w.u, task.p, dx, w.ahead.g, w.ahead.m)
+    hold_memories(task, dx)
     for j in range(lanes.size):
         limit = p + 1.0 if inside.wanted[j] else 1.0
         if inside.looked[j] > 0.0 and _defect(task, w, dx, j) <= limit:
@@ -456,6 +397,14 @@ def _defect(task, w, dx, j):
         slope = value_and_slope(task.taylor.highest, at, w.taylor.terms, i, j)[1]
         defect = abs(w.h[j] * (dx[i, j] - slope))
         part = defect / (task.atol + task.rtol * abs(w.ahead.x[i, j]))
+        largest = part if part > largest or part != part else largest
+    for i in range(task.rows.memory.size):
+        becomes = w.ahead.m[i, j]
+        foreseen = value_and_slope(
+            task.taylor.highest - 1, w.inside.looked[j] * w.h[j], w.taylor.terms,
+            becoming(task, w, i), j,
+        )[0]  # fmt: skip
+        part = abs(becomes - foreseen) / (task.atol + task.rtol * abs(becomes))
         largest = part if part > largest or part != part else largest
     return largest
 
