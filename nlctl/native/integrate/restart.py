@@ -46,12 +46,25 @@ def memory_rates(rhs, task, lanes, w, x, dx):
 
 
 @numba.njit(**INNER)
-            w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
-        away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
-        w.h[j] = away
+def _evaluate_away(rhs, task, lanes, w, x, dx):
+    """Fill w.ahead with what the equations are at times away by w.h."""
+    for j in range(lanes.size):
+        w.t[j] = w.ahead.begin[j] + w.h[j]
         for i in range(x.shape[0]):
-            ahead.x[i, j] = x[i, j] + away * dx[i, j]
-    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
+            w.ahead.x[i, j] = x[i, j] + w.h[j] * dx[i, j]
+    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g, w.ahead.m)
+
+
+@numba.njit(**INNER)
+def _turn_back(task, lanes, w):
+    """Have lanes that have looked behind a condition look back; return whether there are any."""
+    # What carries a memory along may jump there, and a jump says nothing of a rate.
+    any_turns = False
+    for j in range(lanes.size):
+        if w.h[j] > 0.0 and _crosses(w, task.rows.declared, task.rows.guarded, j):
+            w.h[j] = -_far(task, lanes[j].step)
+            any_turns = True
+    return any_turns
 
 
 @numba.njit(**INNER)
