@@ -102,6 +102,7 @@ def _consistent(
         k = max(int(np.searchsorted(t, event.time)) - 1, 0)
         here = _sides(look(event.time)[: sides.shape[1]], guards)
         changed = (sides[k] != 0.0) & (here != 0.0) & (here != sides[k])
+        changed[:guards] &= sides[k, :guards] > 0.0
         changed[event.number] = False
         earlier = [
             _crossing(look, np.array([t[k], event.time]), (sides[k, i], i < guards), (i, 0), None)
@@ -134,10 +135,11 @@ def _suspects(
     And where the least value is to be sought of one that may come back.
     """
     leaves = (sides[:-1] != 0.0) & (sides[1:] != sides[:-1])
+    leaves[:, :guards] &= sides[:-1, :guards] > 0.0  # a guard happens where it falls
     found: list[Any] = [(int(i), int(k), None) for k, i in np.argwhere(leaves)]
     is_near = looks.lowest(sides) <= looks.doubt
     is_near &= (sides[:-1] == sides[1:]) & (np.abs(sides[:-1]) == 1.0)
-    is_near[:, :guards] &= sides[:-1, :guards] > 0.0  # a guard happens where it falls
+    is_near[:, :guards] &= sides[:-1, :guards] > 0.0
     for k, i in np.argwhere(is_near).tolist():
         found.append((i, k, looks.around(k, i, sides)))
     return sorted(found, key=lambda one: one[1])
