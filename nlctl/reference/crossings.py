@@ -1,9 +1,9 @@
 """Where something happens within a step, on the polynomial that an integrator has of it.
 
-A step is looked at in 18 places, near its ends as well; one of the short steps with which an
-integrator begins again, in 7.  Between two of them a sign that has changed is located; where a
-function comes close to 0 and goes away again, its least value is looked for.  A memory is located
-where it reverses, and where it jumps.
+A step is looked at in 22 places, near its ends as well, and one of the short steps with which an
+integrator begins again in 9; where functions do more than is seen there, `looks` has more places.
+Between two of them a sign that has changed is located; where a function may be 0 in between, its
+least value is looked for.  A memory is located where it reverses, and where it jumps.
 """
 
 from __future__ import annotations
@@ -14,23 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-STEP_PLACES = np.array([0.0, 1e-3, *(np.arange(1, 15) / 15.0), 1.0 - 1e-3, 1.0])
-FEW_PLACES = np.array([0.0, 1e-3, 0.25, 0.5, 0.75, 1.0 - 1e-3, 1.0])
-_CLOSE = 2.0  # a function that falls by half of its value from place to place may reach 0
+from .looks import STEP_PLACES, LookPlaces, Looks, looks_at_step
+
 _ULPS = 4.0
-# each time four neighbours, as far apart as places of a step, and one between the middle two:
-# not halfway, where a wave that the four do not see may be 0 as well
-_BETWEEN = 0.38
-CHECKED_PLACES = np.array([k + i for k in (0, 4, 8, 12) for i in (0, 1, 2, 3, 1 + _BETWEEN)]) / 15.0
-FEW_CHECKED = np.array([k + i for k in (0, 1) for i in (0, 1, 2, 3, 1 + _BETWEEN)]) / 4.0
-# the cubic through values at -1, 0, 1, 2 there
-_CUBIC = np.array([
-    -_BETWEEN * (_BETWEEN - 1) * (_BETWEEN - 2) / 6,
-    (_BETWEEN + 1) * (_BETWEEN - 1) * (_BETWEEN - 2) / 2,
-    -(_BETWEEN + 1) * _BETWEEN * (_BETWEEN - 2) / 2,
-    (_BETWEEN + 1) * _BETWEEN * (_BETWEEN - 1) / 6,
-])  # fmt: skip
-_NEAR, _FOLLOWED = 20.0, 0.1  # of the range of a function in a step
 _RESOLVED = 1e-9  # of a bracket: how closely an extreme value is located
 _NEITHER = 2.0  # the side of a number that is NaN
 _STEADY = 0.6  # a memory that changes by less than this part in half of the time does not jump
@@ -51,51 +37,88 @@ class Event(NamedTuple):
 
 
 def first_event(
-    look: Callable[[float], np.ndarray],
+    look: Callable[..., np.ndarray],
     ends: tuple[float, float],
     before: np.ndarray,
     kinds: tuple[int, int],
     small: Callable[[np.ndarray], np.ndarray],
-    places: np.ndarray = STEP_PLACES,
+    places: LookPlaces = STEP_PLACES,
 ) -> Event | None:
-    """Return the first event in a step.
+    """Return the first event in a step; ``look(t, rounded)`` is that of `looks_at_step`.
 
     Shapes: `before` (n,).
     """
     begin, end = ends
-    t = begin + places * (end - begin)
-    t[-1] = end
-    seen = np.array([before, *(look(float(s)) for s in t[1:])])
-    guards, signed = kinds[0], sum(kinds)
-    sides = _side(seen[:, :signed])
-    sides[:, :guards] = np.where(seen[:, :guards] >= 0.0, 1.0, -1.0)
-    for k in range(1, len(t)):  # what is exactly 0 is still on its side
-        sides[k] = np.where(sides[k] == 0.0, sides[k - 1], sides[k])
-    first = Event(np.inf, -1)
-    for i, k in _suspects(seen[:, :signed], sides, guards):
-        if t[max(k - 1, 0)] < first.time:
-            first = min(first, _crossing(look, t, sides[k, i], i, k, seen[:, i], i < guards))
-    least = small(np.abs(seen[:, signed:]).max(axis=0, initial=0.0))
-    for i in range(signed, before.size):
-        first = min(first, _memory(look, t, i, seen[:, i], least[i - signed], first.time))
+    signed, first = sum(kinds), Event(np.inf, -1)
+    t, seen = [begin], [before]
+    sides = _sides(before[:signed], kinds[0])
+    for looks in looks_at_step(look, ends, before, places, signed):
+        t += looks.t[1:].tolist()
+        seen += list(looks.values[1:])
+        first, sides = _signed(look, looks, sides, kinds)
+        if first.number >= 0:
+            break
+    memories = np.array(seen)[:, signed:]
+    least = small(np.abs(memories).max(axis=0, initial=0.0))
+    for i in range(before.size - signed):
+        own = _memory(look, np.array(t), signed + i, memories[:, i], least[i], first.time)
+        first = min(first, own)
     if not first.time <= end:
         return None
     apart = _TOGETHER * max(abs(begin), abs(end))
     return Event(min(first.time + apart, end), first.number, max(first.time - apart, begin))
 
 
-def is_followed(values: np.ndarray) -> bool:
-    """Return whether looks at `CHECKED_PLACES` say what functions are at those in between.
+def _signed(
+    look: Callable[..., np.ndarray], looks: Looks, came: np.ndarray, kinds: tuple[int, int]
+) -> tuple[Event, np.ndarray]:
+    """Return the first change of a sign, and the sides of all functions at the end.
 
-    Shapes: `values` (5 k, n).
+    Shapes: `came` (n,), the sides at the begin.
     """
-    fives = values.reshape(-1, 5, values.shape[1])
-    known, between = fives[:, :4], fives[:, 4]
-    with np.errstate(invalid="ignore"):
-        missed = np.abs(np.einsum("k,ikn->in", _CUBIC, known) - between)
-        extent = np.ptp(values, axis=0)
-        is_near = np.abs(values).min(axis=0) <= _NEAR * extent
-    return not np.any(is_near & (missed > _FOLLOWED * extent))
+    guards, first = kinds[0], Event(np.inf, -1)
+    sides = _sides(looks.values[:, : came.size], guards)
+    sides[0] = came
+    for k in range(1, len(looks.t)):  # what is exactly 0 is still on its side
+        sides[k] = np.where(sides[k] == 0.0, sides[k - 1], sides[k])
+    for i, k, near in _suspects(looks, sides, guards):
+        if looks.t[k] < first.time:
+            crossing = _crossing(look, looks.t, (sides[k, i], i < guards), (i, k), near)
+            first = min(first, crossing)
+    return _consistent(look, looks.t, first, sides, guards), sides[-1]
+
+
+def _consistent(
+    look: Callable[..., np.ndarray], t: np.ndarray, event: Event, sides: np.ndarray, guards: int
+) -> Event:
+    """Return the first event, by what functions are at the event that was found.
+
+    One that is on another side there has changed before: a hat narrower than the looks, on top of
+    which something else happens.
+
+    Shapes: `sides` (k, n), at the times t.
+    """
+    for _ in range(sides.shape[1] if event.number >= 0 else 0):
+        k = max(int(np.searchsorted(t, event.time)) - 1, 0)
+        here = _sides(look(event.time)[: sides.shape[1]], guards)
+        changed = (sides[k] != 0.0) & (here != 0.0) & (here != sides[k])
+        changed[:guards] &= sides[k, :guards] > 0.0
+        changed[event.number] = False
+        earlier = [
+            _crossing(look, np.array([t[k], event.time]), (sides[k, i], i < guards), (i, 0), None)
+            for i in np.flatnonzero(changed).tolist()
+        ]
+        before, event = event, min([event, *earlier])
+        if event is before:
+            break
+    return event
+
+
+def _sides(values: np.ndarray, guards: int) -> np.ndarray:
+    """Return the sides of guards, which are at 0 or above or not, and of other functions."""
+    sides = _side(values)
+    sides[..., :guards] = np.where(values[..., :guards] >= 0.0, 1.0, -1.0)
+    return sides
 
 
 def _side(values: Any) -> Any:
@@ -104,37 +127,43 @@ def _side(values: Any) -> Any:
     return np.where(np.isnan(sides), _NEITHER, sides)
 
 
-def _suspects(seen: np.ndarray, sides: np.ndarray, guards: int) -> list[tuple[int, int]]:
-    """Return functions that may leave their side, and the places behind which they do, in order."""
+def _suspects(
+    looks: Looks, sides: np.ndarray, guards: int
+) -> list[tuple[int, int, tuple[float, float] | None]]:
+    """Return functions that may leave their side, the places behind which they do, in order.
+
+    And where the least value is to be sought of one that may come back.
+    """
     leaves = (sides[:-1] != 0.0) & (sides[1:] != sides[:-1])
-    w = sides * seen
-    falls = np.full(w.shape, np.inf)  # how far it falls to a place, from either neighbour
-    falls[1:] = w[:-1] - w[1:]
-    later = np.full(w.shape, np.inf)
-    later[:-1] = w[1:] - w[:-1]
-    dips = (np.minimum(falls, later) >= 0.0) & (w > 0.0)
-    dips[1:] &= sides[1:] == sides[:-1]
-    steepest = np.maximum(np.where(np.isfinite(falls), falls, 0.0),
-                          np.where(np.isfinite(later), later, 0.0))  # fmt: skip
-    close = dips & (w < _CLOSE * steepest)
-    close[:-1] |= leaves
-    close[:, :guards] &= sides[:, :guards] > 0.0  # a guard happens where it falls
-    return sorted(((int(i), int(k)) for k, i in np.argwhere(close)), key=lambda one: one[1])
+    leaves[:, :guards] &= sides[:-1, :guards] > 0.0  # a guard happens where it falls
+    found: list[Any] = [(int(i), int(k), None) for k, i in np.argwhere(leaves)]
+    is_near = looks.lowest(sides) <= looks.doubt
+    is_near &= (sides[:-1] == sides[1:]) & (np.abs(sides[:-1]) == 1.0)
+    is_near[:, :guards] &= sides[:-1, :guards] > 0.0
+    for k, i in np.argwhere(is_near).tolist():
+        found.append((i, k, looks.around(k, i, sides)))
+    return sorted(found, key=lambda one: one[1])
 
 
-def _crossing(look, t, side, i, k, values, is_guard) -> Event:
-    """Return where a function leaves its side behind a place, or dips around it."""
+def _crossing(
+    look: Callable[..., np.ndarray],
+    t: np.ndarray,
+    side: tuple[float, bool],
+    which: tuple[int, int],
+    near: tuple[float, float] | None,
+) -> Event:
+    """Return where a function leaves its side behind a place, or dips near one."""
+    (sign, is_guard), (i, k) = side, which
 
     def stays(value: float) -> bool:
-        return (value >= 0.0) if is_guard else (_side(value) in (side, 0.0))
+        return (value >= 0.0) if is_guard else (_side(value) in (sign, 0.0))
 
-    last = t.size - 1
-    a, b = float(t[k]), float(t[min(k + 1, last)])
-    if stays(values[min(k + 1, last)]):
-        a = float(t[max(k - 1, 0)])
-        b = _lowest(lambda s: side * look(s)[i], a, b)
+    a, b = float(t[k]), float(t[k + 1])
+    if near:
+        b = _lowest(lambda s: sign * look(s)[i], *near)
         if stays(look(b)[i]):
             return Event(np.inf, -1)
+        a = float(t[max(int(np.searchsorted(t, b)) - 1, 0)])
     return Event(first_behind(lambda s: look(s)[i], stays, a, b), i)
 
 

@@ -12,22 +12,16 @@ from typing import Any
 import numpy as np
 from scipy.integrate import RK45, OdeSolver
 
-from ..errors import DivergedError
+from ..errors import ChatteringError, DivergedError
 from ..sampling.system import happening
 from ..supplied import supplying
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
 from ..upstream.systems import System
-from .crossings import (
-    CHECKED_PLACES,
-    FEW_CHECKED,
-    FEW_PLACES,
-    STEP_PLACES,
-    Event,
-    first_event,
-    is_followed,
-)
+from .crossings import Event, first_event
 from .jumps import Jumps
+from .looks import FEW_PLACES, STEP_PLACES
 from .past import Past
+from .rough import MOST_STEPS, ROUGH, next_to, rough_state
 from .stops import TIME_ROUNDING, Stops
 from .switches import Switches
 
@@ -37,10 +31,10 @@ _PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
 _FIRST = 1e-9  # of a run: the first step of an explicit method where another one has failed
-_ROUNDED = 1.0 + 1e-9
-_SHORT_ONE = 0.01  # of the longest step so far: conditions are followed in it
-_SHORTER, _REFUSALS = 0.3, 9  # part of a step to be tried instead, and how often in a row
+_ROUNDED, _ULPS = 1.0 + 1e-9, 4.0  # times a step, and of its time: what is as long
 _SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
+_STUCK, _SAMES = 1e-5, 40  # part of a run: shorter steps, so many of which are alike
+_LOOKED_AT = 2000  # steps, after each of which it is asked whether rates are noise
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -99,6 +93,7 @@ class Driver:
         """Go from the first time to the last; `rows` grow on the way."""
         self.reached, self._span = begin, end - begin  # the time of the last accepted step (s)
         self.jumps.span = self._span
+        self._looked_at, self._end = begin, end
         tolerances = self.settings["rtol"], self.settings["atol"]
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
         t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
@@ -149,14 +144,14 @@ class Driver:
         self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
         while True:
-            if (message := solver.step()) is not None:
-                solver = self._begun_again(solver, stop, bounded, message)
+            message = solver.step()
+            if message is not None or self._is_stuck(solver):
+                solver = self._begun_again(solver, stop, {**bounded, "max_step": bound}, message)
                 continue
             state = self._solution(solver)
-            allowed = self._allowed(solver, state, bound, stop)
-            if allowed:
+            if allowed := self._allowed(solver, state, bound, stop):
                 bound = allowed
-                short = self._shortened(solver, stop, {**self._bounded(t, stop), "max_step": bound})
+                short = self._shortened(solver, stop, {**bounded, "max_step": bound})
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
             self._note_left(float(solver.t_old), float(solver.t), state)
@@ -179,8 +174,13 @@ class Driver:
                 self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
 
-    def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str) -> Any:
-        """Return an integrator that begins where one has failed, explicit where that fails too."""
+    def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str | None) -> Any:
+        """Return an integrator that begins where one has failed, explicit where that fails too.
+
+        Without a message, at the last step of one that is stuck.
+        """
+        if message is None:
+            return self.method(self._rates, solver.t_old, self._held, stop, **bounded)
         t, failed = float(solver.t), self._failed
         if isinstance(solver, RK45) or not np.all(np.isfinite(self._rates(t, self._held))):
             raise RuntimeError(f"solve_ivp failed: {message}")
@@ -190,6 +190,20 @@ class Driver:
         own = {name: bounded[name] for name in ("rtol", "atol", "max_step")}
         first = min(_FIRST * self._span, own["max_step"], stop - t)
         return RK45(self._rates, t, self._held, stop, first_step=first, **own)
+
+    def _is_stuck(self, solver: Any) -> bool:
+        """Whether an integrator takes the same short step over and over again.
+
+        LSODA does, where it has seen a jump in its first step: it keeps the slope of that jump for
+        that of the rates.  Begun again it knows nothing of it.
+        """
+        length = float(solver.t - solver.t_old)
+        is_same = length < _STUCK * self._span and abs(length - self._same) < 1e-9 * length
+        self._same, self._sames = length, (self._sames + 1) if is_same else 0
+        if self._sames < _SAMES:
+            return False
+        self._sames = 0
+        return True
 
     def _shortened(self, solver: Any, stop: float, bounded: dict[str, Any]) -> dict[str, Any]:
         """Return the arguments of an integrator that begins a step again, which was too long."""
@@ -217,29 +231,14 @@ class Driver:
         length = float(solver.t - solver.t_old)
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
         may_grow &= solver.t_old != self._narrow  # a longer step from there has been refused
-        if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
+        rounded = _ROUNDED * longest + _ULPS * np.spacing(abs(float(solver.t)))
+        if length > rounded or (may_grow and length > 0.5 * bound):
             return longest
-        part = self.jumps.followed(solver.t_old + STEP_PLACES * length, state)
+        part = self.jumps.followed(solver.t_old + STEP_PLACES.at * length, state)
         if part < 1.0 and part * length > _SHORTEST * self._span:
             self._narrow = float(solver.t_old)
             return part * length
-        if length > _SHORT_ONE * self._longest and not self._is_resolved(solver, state):
-            return _SHORTER * length
         return self._span / _PLACES if self._slept(solver, state) else 0.0
-
-    def _is_resolved(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
-        """Whether conditions are as far apart within a step as their looks say, not waves of them.
-
-        A step with a jump in it never is: it is asked for so many shorter ones alone.
-        """
-        begin, length = float(solver.t_old), float(solver.t - solver.t_old)
-        self._refused = self._refused + 1 if begin == self._refused_at else 0
-        self._refused_at = begin
-        if self.jumps.crossings is None or self._refused >= _REFUSALS:
-            return True
-        places = FEW_CHECKED if length < _SHORT * self._longest else CHECKED_PLACES
-        looks = [self._looked(s, state(s)) for s in (begin + places * length).tolist()]
-        return is_followed(np.array(looks)[:, : sum(self.jumps.kinds)])
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
@@ -293,7 +292,7 @@ class Driver:
         length = solver.t - solver.t_old
         self._longest = max(self._longest, length)
         event = first_event(
-            lambda t: self._looked(t, state(t)),
+            lambda t, rounded=1.0: self._looked(t, rounded * state(t)),
             (float(solver.t_old), float(solver.t)),
             seen,
             self.jumps.kinds,
@@ -337,7 +336,7 @@ class Driver:
         waits[self.jumps.switching] = False
         if not waits.any():
             return
-        s = t + STEP_PLACES[1] * (until - t)
+        s = t + STEP_PLACES.at[1] * (until - t)
         sides, x = self._signs(self._looked(s, state(s))), state(t)
         for i in np.flatnonzero(waits & (sides != 0.0)).tolist():
             self._note_first(i, t, bool(sides[i] > 0.0), x)
@@ -381,11 +380,29 @@ class Driver:
         if self._repeated > _STANDSTILL or not np.all(np.isfinite(x)):
             raise diverged(self.system, self.reached)
         self.reached = float(t)
+        self._steps += 1
+        if self._steps % _LOOKED_AT == 0:
+            self._check_noise(t, x)
         if self.progress is not None:
             self.progress(self.reached)
 
+    def _check_noise(self, t: float, x: np.ndarray) -> None:
+        """End a run that makes no way because its rates change with the rounding of states."""
+        length, self._looked_at = (t - self._looked_at) / _LOOKED_AT, t
+        if self._end - t <= MOST_STEPS * length:
+            return
+        scale = self.settings["atol"] + self.settings["rtol"] * np.abs(x)
+        i = rough_state(self._rates, [(t, next_to(x, 64.0 * k)) for k in range(5)], length, scale)
+        if i is not None:
+            block, label = self.jumps.state_label(i)
+            raise ChatteringError(
+                f"'{self.system.name}' is chattering at t = {t:.6g} s: '{label}'' of block "
+                f"'{block}' jumps {ROUGH}",
+                t,
+            )
+
     _repeated, _longest, _ended, _failed, _narrow = 0, 0.0, False, np.nan, np.nan
-    _refused, _refused_at = 0, np.nan
+    _same, _sames, _steps = 0.0, 0, 0
     _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:

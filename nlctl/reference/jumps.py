@@ -130,6 +130,12 @@ class Jumps:
         self.kinds = (len(own["guard"]), signed - len(own["guard"]))
         self.switching = slice(len(own["guard"]), len(before))
 
+    def state_label(self, i: int) -> tuple[str, str]:
+        """Return block and name of a state of the diagram."""
+        owner = [leaf for leaf in leaves(self.system) if leaf.state_offset <= i][-1]
+        name = str(owner.path or owner.system.name)
+        return name, owner.system.state_labels[i - owner.state_offset]
+
     def label(self, number: int) -> tuple[str, str]:
         """Return block and name of a row of what `look` returns."""
         return self.labels[number] if self.labels else ("", "")

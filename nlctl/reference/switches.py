@@ -24,6 +24,8 @@ _MANY = 200  # switches of one condition, from which on their pace alone says wh
 _LOOKED_AT = 100  # switches, after each of which it is asked whether there are ever more
 _MORE = 1e4  # switches to come that are too many: each takes tens of milliseconds
 
+Switch = tuple[float, np.ndarray, np.ndarray]  # time (s), state and rates right behind it
+
 
 class Switches:
     """When the conditions of a run of a diagram have been at 0."""
@@ -38,6 +40,8 @@ class Switches:
         self._name, self._label, self._ends, self._tolerances = name, label, ends, tolerances
         self._last: deque[float] = deque(maxlen=_CROWD)
         self._times: defaultdict[int, list[float]] = defaultdict(list)
+        # the last two switches of each condition: one wave may be cut close to its peak
+        self._before: defaultdict[int, deque[Switch]] = defaultdict(lambda: deque(maxlen=2))
 
     def note(self, i: int, t: float) -> None:
         """Note that something has happened."""
@@ -60,21 +64,36 @@ class Switches:
         small = crowd_of(
             np.array(times[-2 * AT_LEAST :]), i, end, np.max(self._tolerances[0]), _MORE
         )
-        if small and self._is_small(small, t, value, x, rates):
+        two = self._before[i]
+        if small and self._are_small(value, t, two):
             raise self._accumulate(small, t, "and what is compared is within tolerances of 0")
-        if len(times) % _LOOKED_AT == 0 and len(times) >= _MANY:
+        if len(times) % _LOOKED_AT == 0:
+            self._check_pace(i, t, value)
+        two.append((t, x, rates))
+
+    def _check_pace(self, i: int, t: float, value: StateValue) -> None:
+        """End a run whose switches are too many, or are one place to its tolerances."""
+        times, end = self._times[i], self._ends[1]
+        took = t - times[-_LOOKED_AT]
+        if (end - t) * _LOOKED_AT > _MORE * took and self._are_small(value, t, self._before[i]):
+            block, which = self._label(i)
+            whose = f"block '{block}' ({which})" if block else f"'{which}'"
+            words = f"{whose} switches over and over again, {_LOOKED_AT} times in {took:.3g} s"
+            raise self._chattering(t, f"{words}, and what is compared is within tolerances of 0")
+        if len(times) >= _MANY:
             more = crowd_of(np.array(times[-len(times) // 2 :]), i, end, np.inf, _MORE)
             if more:
                 raise self._accumulate(more, t, "too many for engine='python-control'")
 
-    def _is_small(
-        self, crowd: Crowd, t: float, value: StateValue, x: np.ndarray, rates: np.ndarray
-    ) -> bool:
-        """Whether from one switch to the next what is compared stays within tolerances."""
+    def _are_small(self, value: StateValue, now: float, two: deque[Switch]) -> bool:
+        """Whether what is compared has stayed within tolerances since each of two switches."""
         rtol, atol = self._tolerances
-        away = (atol + rtol * np.abs(x)) * np.isfinite(rates)
-        there = reached(value, t, x, rates, crowd.period / 8)
-        return there <= WITHIN * tolerance_of(value, t, x, away)
+        ends = [*(t for t, *_ in two), now][1:]
+        return len(two) == two.maxlen and all(
+            reached(value, t, x, rates, (until - t) / 4)  # of a parabola: as far as it gets
+            <= WITHIN * tolerance_of(value, t, x, (atol + rtol * np.abs(x)) * np.isfinite(rates))
+            for (t, x, rates), until in zip(two, ends, strict=True)
+        )
 
     def _accumulate(self, crowd: Crowd, t: float, beyond: str) -> ChatteringError:
         return self._chattering(t, accumulation_words(self._label(crowd.row), crowd, beyond))

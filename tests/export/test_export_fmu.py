@@ -87,6 +87,29 @@ def test_both_versions_have_no_findings_and_move_alike(written, name, version):
         assert max(found) < 1e-8, kind
 
 
+def test_co_simulation_steps_over_no_pulse_of_a_state(tmp_path):
+    """x0 = t: areas of a Gaussian, of cosh^-2 = tanh', of 1 / (1 + s^2), each 1e-3 wide, to 3 s."""
+
+    def pulses(t, x, u, p):
+        s = (x[0] - np.array([0.7, 1.4, 2.1])) / 1e-3
+        return [
+            1.0, np.exp(-(s[0] ** 2)), 1 - np.tanh(s[1]) ** 2, 1 / (1 + s[2] ** 2),
+            1.0 if np.exp(-(((x[0] - 2.5) / 1e-3) ** 2)) > 0.5 else 0.0,
+        ]  # fmt: skip
+
+    block = ct.nlsys(
+        pulses, lambda t, x, u, p: x[1:], inputs=0, states=5, outputs=["a", "b", "c", "d"],
+        name="pulses",
+    )  # fmt: skip
+    fmu(block, tmp_path / "m.fmu", name="model", platforms=["linux"], stop_time=3.0)
+    run, _ = simulated(tmp_path / "m.fmu", "CoSimulation", 3.0, points=2, tolerance=1e-9)
+    areas = [
+        np.sqrt(np.pi), 2.0, np.arctan(900.0) + np.arctan(2100.0), 2 * np.sqrt(np.log(2)),
+    ]  # fmt: skip
+    theirs = [run[name][-1] for name in "abcd"]
+    np.testing.assert_allclose(theirs, 1e-3 * np.array(areas), rtol=1e-5)
+
+
 def test_bounces_are_located_to_a_nanosecond(written):
     """From a height of 1: at sqrt(2 / g) and then 2 * 0.8^k sqrt(2 / g) apart."""
     path, *_ = written("bouncing ball")

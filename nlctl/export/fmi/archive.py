@@ -48,7 +48,9 @@ def fmu(
     It has Model Exchange and Co-Simulation in one file, with sources and libraries for all
     platforms.  What both engines of nlctl stop at is an event there: guards, switching functions
     and conditions are event indicators, samples of clocks and conditions of t alone are time
-    events, and memories are committed after each accepted step.
+    events, and memories are committed after each accepted step.  In Co-Simulation no step leads
+    over a function that is flat but for a narrow range of a state (a Gaussian, a steep tanh).  In
+    Model Exchange steps are the importer's, and FMI has no word for this: bound them there.
 
     Parameters
     ----------

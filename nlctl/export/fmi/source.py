@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from uuid import UUID
 
 from ..._version import __version__
+from ...expressions.sharp import AREA, ITSELF, LEADS, RANGE, SHORTER
 from ...native.codegen.c.body import CModule, c_number
 from ...native.codegen.c.program import function_text
 from ...native.integrate.methods.tsit5 import TSIT5
@@ -16,7 +17,8 @@ from ..words import comment
 from .records import Model
 
 _SHORT = 1e-7  # of the stop time: over which is seen whether a memory reverses
-_SHARED = ("common.h", "instance.h", "machine.h", "machine.c", "model.c", "wide.c")
+_SHARED = ("common.h", "instance.h", "machine.h", "machine.c", "model.c", "sharp.h", "sharp.c",
+           "wide.c")  # fmt: skip
 
 
 def sources(model: Model, version: int) -> dict[str, str]:
@@ -65,6 +67,7 @@ extern const Bounds model_bounds[N_PARAMETERS + 1];
 extern const unsigned model_meetings[N_MEETINGS + 1];
 extern const int model_continuous[N_STATES + 1], model_memory[N_MEMORY + 1];
 extern const int model_sampled[N_SAMPLED + 1], model_reset_states[N_RESETS + 1];
+extern const int model_sharp_kinds[N_SHARP + 1];
 extern const int model_owned[N_GUARDS + 1][N_RESETS + 1];
 extern const double model_a[STAGES - 1][STAGES], model_nodes[STAGES], model_error[STAGES];
 
@@ -79,7 +82,8 @@ extern const double model_a[STAGES - 1][STAGES], model_nodes[STAGES], model_erro
   void model_outputs##with(double t, const double x[], const double u[], double c[], double y[]); \\
   void model_sample##with(int k, double t, const double x[], const double u[], double c[], \\
                           double s[]); \\
-  void model_reset##with(double t, const double x[], const double u[], double c[], double s[]);
+  void model_reset##with(double t, const double x[], const double u[], double c[], double s[]); \\
+  void model_sharp##with(double t, const double x[], const double u[], double c[], double s[]);
 
 FUNCTIONS()
 FUNCTIONS(_plain)
@@ -100,14 +104,17 @@ def _sizes(model: Model) -> list[str]:
         "SIGNS": rows["g"], "GUARDS": len(model.guards), "MEMORY": len(model.memory),
         "SAMPLED": len(model.sampled), "RESETS": resets, "SERIES": len(what.series),
         "MEETINGS": len(what.meetings), "BREAKS": len(what.breaks),
-        "INDICATORS": model.indicators, "DECLARED": model.declared,
+        "SHARP": len(model.lowered.sharp), "INDICATORS": model.indicators,
+        "DECLARED": model.declared,
     }  # fmt: skip
     numbers = {
         "KNOWN_UNTIL": what.known_until, "LONGEST": what.longest, "TOLERANCE": model.tolerance,
-        "SHORT_TIME": _SHORT * model.stop_time,
+        "SHORT_TIME": _SHORT * model.stop_time, "RANGE": RANGE, "LEADS": LEADS,
+        "SHORTER": SHORTER,
     }  # fmt: skip
     lines = [f"#define N_{name} {size}" for name, size in sizes.items()]
     lines += [f"#define OF_{kind.upper()} {first}u" for kind, first in at.items()]
+    lines += [f"#define {name} {kind}" for name, kind in (("ITSELF", ITSELF), ("AREA", AREA))]
     lines += [f"#define {name} {c_number(value)}" for name, value in numbers.items()]
     return lines
 
@@ -115,7 +122,6 @@ def _sizes(model: Model) -> list[str]:
 def _equations(model: Model) -> str:
     """Return what is compiled for any processor, and where it can be for a wide one."""
     module, functions = CModule(), dict(model.lowered.functions)
-    functions.pop("sharp", None)  # its own integrator does not ask for that
     labels = {
         f"{array}[{i}]": comment(v.name)
         for array, kind in (("x", "states"), ("u", "inputs"), ("p", "parameters"))
@@ -127,7 +133,6 @@ def _equations(model: Model) -> str:
         for name in functions
         if name.startswith("sample")
     )
-    resets = "  reset(&t, x, u, c, s);\n" if "reset" in functions else _UNUSED
     return f"""\
 /* {comment(model.meaning)}, written by nlctl {__version__} from the graph of its equations. */
 #include "model.h"
@@ -156,9 +161,17 @@ void VERSION(model_sample)(int k, double t, const double x[], const double u[], 
   }}
 }}
 
-void VERSION(model_reset)(double t, const double x[], const double u[], double c[], double s[])
+{_like_sample("reset", functions)}
+{_like_sample("sharp", functions)}"""
+
+
+def _like_sample(name: str, functions: Mapping[str, object]) -> str:
+    """Return a function that fills `s`, if there is something to be filled in."""
+    body = f"  {name}(&t, x, u, c, s);\n" if name in functions else _UNUSED
+    return f"""\
+void VERSION(model_{name})(double t, const double x[], const double u[], double c[], double s[])
 {{
-{resets}}}
+{body}}}
 """
 
 
@@ -194,6 +207,7 @@ def _tables(model: Model) -> str:
         _table("int model_memory", map(str, model.memory)),
         _table("int model_sampled", map(str, model.sampled)),
         _table("int model_reset_states", map(str, resets)),
+        _table("int model_sharp_kinds", map(str, model.lowered.sharp)),
         _table("int model_owned", (_list([*map(str, row), "0"]) for row in owned),
                f"[{len(resets) + 1}]"),
         f"const double model_a[STAGES - 1][STAGES] = {{{', '.join(a)}}};",

@@ -14,7 +14,8 @@ tell that from stiffness and from fast oscillations:
 A step that got to where it had to end, at a sample of the inputs, a clock or a break of a delay,
 is as long as it could be, and no sign of anything: a run at rest is all such steps.
 
-Switches that come ever closer together are another thing, see `accumulation`.
+Switches that come ever closer together are another thing, see `accumulation`, and so are rates
+that change with the rounding of states, see `reference.rough`.
 
 It is looked for in windows of so many steps that a usual run has none, and rarely in a run that
 goes on as it began.  What is found of a member never depends on the members beside it.
@@ -28,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from ...reference.rough import MOST_STEPS, next_to, rough_state
 from ..integrate.state import METHOD, RUNNING
 from ..integrate.workspace import Task, Work
 from .accumulation import accumulated, accumulating
@@ -36,6 +38,7 @@ from .steps import Attempt, Jump, LaneEquations, parameters_of
 WINDOW = 1800  # steps tried, at least
 PROBE = 200  # of them that are looked at, at the end
 _PROBES = 5  # as many of Taylor's method: it has few steps, and tries a hundred for a switch
+_ROUGH_PLACES = 10  # of the steps looked at, for whether rates are noise
 _JUMPS = 10  # of them with a jump
 _WITHIN = 100.0  # tolerances that a state moves in a mean step
 _FARTHER = 10.0  # times as far in an accepted step
@@ -100,8 +103,29 @@ def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     c = parameters_of(run, j)
     jump = _stayed_at(run, attempts[-PROBE:], j, c)
     if jump is None:
-        return accumulating(LaneEquations(run=run, j=j, c=c), attempts)
+        evaluated = LaneEquations(run=run, j=j, c=c)
+        return accumulating(evaluated, attempts) or _roughness(evaluated, attempts)
     return replace(jump, crowd=accumulated(run, j, jump.time))
+
+
+def _roughness(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | None:
+    """Return a place of a lane whose rates are noise, if there is no end of its steps by that."""
+    run, j = evaluated.run, evaluated.j
+    task, now = run.task, run.lanes["t"][j]
+    length = (now - attempts[0].t[j]) / len(attempts)
+    if task.times[-1] - now <= MOST_STEPS * length:
+        return None
+    looked_at = attempts[:: max(len(attempts) // _ROUGH_PLACES, 1)]
+    u, x = looked_at[-1].u[:, j], looked_at[-1].x[:, j]
+    scale = task.atol + task.rtol * np.abs(x)
+    found = rough_state(
+        lambda t, z: evaluated(t, z, u)[: x.size],
+        [(float(a.t[j]), a.x[:, j]) for a in looked_at], length, np.broadcast_to(scale, x.shape),
+    )  # fmt: skip
+    if found is None:
+        return None
+    t = float(looked_at[-1].t[j])
+    return Jump(times=(t, t), before=x, after=next_to(x), inputs=u, is_rough=True)
 
 
 def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...accumulation import SECOND_ORDER, accumulation_words
 from ...diagrams import overridden
+from ...reference.rough import ROUGH
 from ...upstream.control_internals import rates_now
 from ...upstream.systems import System
 from ..audit import every_output
@@ -38,6 +39,8 @@ def chattering_words(
         which = labels[row] if row < len(labels) else ("", "a condition")
         why = "and what is compared is within tolerances of 0"
         return accumulation_words(which, jump.crowd, why)
+    if jump.is_rough:
+        return f"{_changed(compiled, p, params, jump)} {ROUGH}"
     if relays and _keeps_on_switching(compiled, p, jump):
         return f"{_committed(compiled, p, jump)}: its switches accumulate; {SECOND_ORDER}"
     advice = (

@@ -21,6 +21,7 @@ class Jump:
     after: np.ndarray
     inputs: np.ndarray  # inputs of the program there
     crowd: Crowd | None = None  # how the switches accumulate, if they do
+    is_rough: bool = False  # whether it jumps with any rounding of the state, see `reference.rough`
 
     @property
     def time(self) -> float:

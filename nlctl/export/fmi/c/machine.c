@@ -2,6 +2,7 @@
 
    Time is seen on the near side of what is due next, until it has happened. */
 #include "machine.h"
+#include "sharp.h"
 
 #include <float.h>
 #include <math.h>
@@ -468,6 +469,11 @@ static int advance(Machine *s, double stop, int *crossings)
   memcpy(r.k[0], s->dx, sizeof r.k[0]);
   for (int tries = 0; tries < 200; ++tries) {
     int over = attempt(s, &r, h);
+    double part = r.error < 1e3 ? sharp_followed(s, s->dx, r.x, r.k[STAGES - 1], h) : 1.0;
+    if (part < 1.0 && part * h > SHORT_TIME) {
+      s->h = h *= part;
+      continue;
+    }
     if (over && r.error < 1e3) {
       int found = locate(s, &r, h);
       if (++*crossings > MOST_CROSSINGS) return failed(s, "it switches over and over again");

@@ -50,3 +50,8 @@ void model_reset(double t, const double x[], const double u[], double c[], doubl
 {
   CALL(model_reset, t, x, u, c, s);
 }
+
+void model_sharp(double t, const double x[], const double u[], double c[], double s[])
+{
+  CALL(model_sharp, t, x, u, c, s);
+}
