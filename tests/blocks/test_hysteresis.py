@@ -195,7 +195,12 @@ class TestEveryOperator:
         """Explicit or stiff, at another tolerance, with fixed steps that meet no turning point."""
         spec, path = data.draw(EVERY[kind]), data.draw(paths)
         times, known = np.arange(float(len(path))), along(spec, path)
-        for options in ({"method": "rodas5p"}, {"method": "taylor"}, {"rtol": 1e-4, "atol": 1e-6}, {"step": 0.37}):
+        for options in (
+            {"method": "rodas5p"},
+            {"method": "taylor"},
+            {"rtol": 1e-4, "atol": 1e-6},
+            {"step": 0.37},
+        ):
             found = drive(spec, times, path, **options).outputs[0]
             np.testing.assert_allclose(found, known, rtol=0, atol=1e-12)
 
