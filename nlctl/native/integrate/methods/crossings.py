@@ -26,6 +26,16 @@ def is_followed(highest, h, terms, row, j):
 
 
 @numba.njit(**INNER)
+def is_at(highest, h, terms, row, value, j):
+    """Whether a polynomial is at h what the right-hand side says: its last terms may both be 0."""
+    extent, foreseen = abs(terms[highest, row, j]), terms[highest, row, j]
+    for k in range(highest - 1, -1, -1):
+        extent = extent * h + abs(terms[k, row, j])
+        foreseen = foreseen * h + terms[k, row, j]
+    return not abs(value - foreseen) > FOLLOWED * extent
+
+
+@numba.njit(**INNER)
 def _turning(p, h, terms, row, ends, slopes, j):
     """Return about where a polynomial's slope is 0, between two places where its signs differ."""
     (low, high), (first, last), least = ends, slopes, 0.0

@@ -27,7 +27,7 @@ from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
 from .carried import becoming, fill_slopes, first_turn, turns_inside, turns_until
-from .crossings import LOOKS, first_crossing, is_followed, root_of, side_left_to
+from .crossings import LOOKS, first_crossing, is_at, is_followed, root_of, side_left_to
 from .dips import value_and_slope
 
 SLOPES = 2  # slopes at both ends of a step
@@ -323,7 +323,10 @@ def _compare(task, lane, w, j):
     if again < 1.0:
         inside.looked[j], inside.foreseen[j] = -1.0, again
     for i in range(task.rows.switching):
-        if not is_followed(p, w.h[j], taylor.terms, n + i, j):
+        follows = is_followed(p, w.h[j], taylor.terms, n + i, j)
+        if until == 1.0 and w.h[j] > 1e6 * _shortest(task):  # nothing jumps before the end
+            follows &= is_at(p, w.h[j], taylor.terms, n + i, events.g[i, j], j)
+        if not follows:
             inside.looked[j], inside.foreseen[j] = -1.0, 0.5
         elif not opposite(events.g_start[i, j], events.g[i, j]):
             side = events.g_start[i, j]
