@@ -181,7 +181,8 @@ def _take(task, w, done):
                 events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
         for i in range(rows.memory.size):
             m, become = rows.memory[i], w.memories.m[i, j]
-            if w.memories.rate_start[i, j] == 0.0 and x[m, j] != become:  # otherwise locked
+            stands = w.memories.rate_start[i, j] == 0.0 or w.memories.rate[i, j] == 0.0
+            if stands and x[m, j] != become:  # otherwise locked
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
