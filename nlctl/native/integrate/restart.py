@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from .delayed import arrival
 from .evaluate import evaluate
 from .events.functions import begin_next
 from .samples import time_rounding
@@ -14,6 +15,9 @@ FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 _NEARER = 1e-6  # the same of long steps, by Taylor's method
 _NEAREST = 1e-10  # and of a run
+_ROUNDED = 1e-12  # of a memory: what a brief look may be wrong by
+_BRIEF = 1e3  # of the rounding of times
+_LOOKS = 3  # at most, each nearer than the one before, and then back
 
 
 @numba.njit(**INNER)
@@ -21,24 +25,26 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill w.memories with the rates at which memories would be carried along."""
     # A difference over a small part of the step: its error moves the turning point by so little
     # that the turning value does not change. Where functions of t alone jump, or a condition lies
-    # ahead, it is taken backwards. Where a break point that a block declares lies in between, it
-    # says nothing: a relay is about to jump.
+    # right ahead, it is taken backwards. Where a break point that a block declares lies in between,
+    # it says nothing: a relay is about to jump.
     ahead, memories, h = w.ahead, w.memories, w.h
     for j in range(lanes.size):
         w.t[j] = ahead.begin[j] + _far(task, lanes[j].h)
         if w.t[j] > lanes[j].left:
             w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
         h[j] = w.t[j] - ahead.begin[j]  # what is left of it after rounding
-    _evaluate_away(rhs, task, lanes, w, x, dx)
-    if _turn_back(task, lanes, w):
+    for n in range(_LOOKS + 1):
         _evaluate_away(rhs, task, lanes, w, x, dx)
+        if n == _LOOKS or not _looks_nearer(task, lanes, w, n):
+            break
     for i in range(memories.m.shape[0]):
         for j in range(lanes.size):
             change = ahead.m[i, j] - memories.m[i, j]  # exactly 0 where the memory stands still
             memories.slope[i, j] = change / (h[j] if h[j] < 0.0 else max(h[j], 1e-300))
             if h[j] < 0.0:
                 change = -change
-            noise = 1e-15 * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
+            rounded = _ROUNDED if abs(h[j]) < _BRIEF * time_rounding(task) else 1e-15
+            noise = rounded * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
             known = change == 0.0 or (abs(change) > noise and not _is_between(task, w, j))
             memories.rate[i, j] = change if known else memories.rate_start[i, j]
             if lanes[j].quiet > 0:
@@ -56,15 +62,16 @@ def _evaluate_away(rhs, task, lanes, w, x, dx):
 
 
 @numba.njit(**INNER)
-def _turn_back(task, lanes, w):
-    """Have lanes that have looked behind a condition look back; return whether there are any."""
-    # What carries a memory along may jump there, and a jump says nothing of a rate.
-    any_turns = False
+def _looks_nearer(task, lanes, w, n):
+    """Have lanes that have looked behind a condition look less far; return whether any does."""
+    # What carries a memory along may jump there, and a jump says nothing of a rate. In the end
+    # they look back, which says that a memory moves that has just turned.
+    any_does = False
     for j in range(lanes.size):
         if w.h[j] > 0.0 and _crosses(w, task.rows.declared, task.rows.guarded, j):
-            w.h[j] = -_far(task, lanes[j].step)
-            any_turns = True
-    return any_turns
+            w.h[j] = -_far(task, lanes[j].step) if n == _LOOKS - 1 else 0.01 * w.h[j]
+            any_does = True
+    return any_does
 
 
 @numba.njit(**INNER)
@@ -103,7 +110,8 @@ def restart(rhs, task, lanes, w, chosen):
             if chosen[j] and memories.rate_start[i, j] != 0.0:
                 row, segment = task.rows.memory[i], lanes[j].segment
                 w.x[row, j] = memories.m[i, j]
-                if lanes[j].t - task.times[segment] <= rounding:
+                is_shown = lanes[j].t - task.times[segment] <= rounding
+                if is_shown and _jumps_in_time(task, lanes[j], w, j):
                     w.samples[segment, row, j] = memories.m[i, j]
     _refresh(rhs, task, lanes, w, chosen)
     if memories.m.shape[0]:
@@ -124,6 +132,19 @@ def restart(rhs, task, lanes, w, chosen):
     for j in range(lanes.size):
         if chosen[j]:
             begin_next(task, w, j)
+
+
+@numba.njit(**INNER)
+def _jumps_in_time(task, lane, w, j):
+    """Whether a lane has come to where functions of t jump, a clock samples, or a jump arrives."""
+    early = lane.t - time_rounding(task)
+    if lane.right >= early or (lane.tick > 0 and task.clocks.ticks[j, lane.tick - 1] >= early):
+        return True
+    for i in range(task.lines.delays.shape[0]):
+        k = w.past.first[i, j]
+        if w.past.level[k, i, j] == 0 and arrival(task, i, j, w.past.t[k, j]) >= early:
+            return True
+    return False
 
 
 @numba.njit(**INNER)
