@@ -15,63 +15,35 @@ FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 _NEARER = 1e-6  # the same of long steps, by Taylor's method
 _NEAREST = 1e-10  # and of a run
-_ROUNDED = 1e-12  # of a memory: what a brief look may be wrong by
-_BRIEF = 1e3  # of the rounding of times
-_LOOKS = 3  # at most, each nearer than the one before, and then back
 
 
 @numba.njit(**INNER)
 def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill w.memories with the rates at which memories would be carried along."""
     # A difference over a small part of the step: its error moves the turning point by so little
-    # that the turning value does not change. Where functions of t alone jump, or a condition lies
-    # right ahead, it is taken backwards. Where a break point that a block declares lies in between,
-    # it says nothing: a relay is about to jump.
-    ahead, memories, h = w.ahead, w.memories, w.h
+    # that the turning value does not change. Where functions of t alone jump, it is taken
+    # backwards. Where a break point lies in between, it says nothing: a relay is about to jump.
+    ahead, memories = w.ahead, w.memories
     for j in range(lanes.size):
         w.t[j] = ahead.begin[j] + _far(task, lanes[j].h)
         if w.t[j] > lanes[j].left:
             w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
-        h[j] = w.t[j] - ahead.begin[j]  # what is left of it after rounding
-    for n in range(_LOOKS + 1):
-        _evaluate_away(rhs, task, lanes, w, x, dx)
-        if n == _LOOKS or not _looks_nearer(task, lanes, w, n):
-            break
+        away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
+        w.h[j] = away
+        for i in range(x.shape[0]):
+            ahead.x[i, j] = x[i, j] + away * dx[i, j]
+    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
     for i in range(memories.m.shape[0]):
         for j in range(lanes.size):
             change = ahead.m[i, j] - memories.m[i, j]  # exactly 0 where the memory stands still
-            memories.slope[i, j] = change / (h[j] if h[j] < 0.0 else max(h[j], 1e-300))
-            if h[j] < 0.0:
+            memories.slope[i, j] = change / (w.h[j] if w.h[j] < 0.0 else max(w.h[j], 1e-300))
+            if w.h[j] < 0.0:
                 change = -change
-            rounded = _ROUNDED if abs(h[j]) < _BRIEF * time_rounding(task) else 1e-15
-            noise = rounded * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
+            noise = 1e-15 * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
             known = change == 0.0 or (abs(change) > noise and not _is_between(task, w, j))
             memories.rate[i, j] = change if known else memories.rate_start[i, j]
             if lanes[j].quiet > 0:
                 memories.rate[i, j] = 0.0  # memories are committed step by step for a while
-
-
-@numba.njit(**INNER)
-def _evaluate_away(rhs, task, lanes, w, x, dx):
-    """Fill w.ahead with what the equations are at times away by w.h."""
-    for j in range(lanes.size):
-        w.t[j] = w.ahead.begin[j] + w.h[j]
-        for i in range(x.shape[0]):
-            w.ahead.x[i, j] = x[i, j] + w.h[j] * dx[i, j]
-    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g, w.ahead.m)
-
-
-@numba.njit(**INNER)
-def _looks_nearer(task, lanes, w, n):
-    """Have lanes that have looked behind a condition look less far; return whether any does."""
-    # What carries a memory along may jump there, and a jump says nothing of a rate. In the end
-    # they look back, which says that a memory moves that has just turned.
-    any_does = False
-    for j in range(lanes.size):
-        if w.h[j] > 0.0 and _crosses(w, task.rows.declared, task.rows.guarded, j):
-            w.h[j] = -_far(task, lanes[j].step) if n == _LOOKS - 1 else 0.01 * w.h[j]
-            any_does = True
-    return any_does
 
 
 @numba.njit(**INNER)
@@ -85,15 +57,8 @@ def _far(task, step):
 
 @numba.njit(**INNER)
 def _is_between(task, w, j):
-    """Whether a break point lies between a state and the look away from it."""
-    declared, guarded = task.rows.declared, task.rows.guarded
-    return _crosses(w, 0, task.rows.bending, j) or _crosses(w, declared, guarded, j)
-
-
-@numba.njit(**INNER)
-def _crosses(w, first, end, j):
-    """Whether one of these functions has another sign where it was looked."""
-    for i in range(first, end):  # noqa: SIM110 (no generators in machine code)
+    """Whether a break point that a block declares lies between a state and the look ahead of it."""
+    for i in range(task.rows.bending):  # noqa: SIM110 (no generators in machine code)
         if opposite(w.events.g[i, j], w.ahead.g[i, j]):
             return True
     return False

@@ -150,11 +150,29 @@ def test_what_costs_more_turns_sooner():
 
 
 def test_what_has_no_coefficients_keeps_the_pair():
-    """The backlash of Example 2 is a memory."""
-    times = np.linspace(0, 4, 401)
-    compiled = nlctl.compile(nlctl.paper.example_2())
+    """What leaves a delay is known as pieces of polynomials of a low order."""
+    line = nlctl.TransportDelay(inputs=("y",), outputs=("u",), delay=0.3)
+    plant = ct.nlsys(lambda t, x, u, p: [np.cos(t) - u[0]], lambda t, x, u, p: [x[0]],
+                     inputs=["u"], outputs=["y"], states=1, name="plant")  # fmt: skip
+    compiled = nlctl.compile(nlctl.interconnect({"plant": plant, "line": line}, outputs=["y"]))
+    times = np.linspace(0, 40, 401)
     auto, pair = (nlctl.input_output_response(compiled, times, method=m) for m in ("auto", "tsit5"))
     np.testing.assert_array_equal(auto.states, pair.states)
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
+def test_a_memory_has_coefficients(rtol):
+    """The backlash of Example 2: Taylor's method takes over, with a fifth of the steps."""
+    times = np.linspace(0, 20, 401)
+    compiled = nlctl.compile(nlctl.paper.example_2())
+    auto, pair = (
+        nlctl.input_output_response(compiled, times, method=m, rtol=rtol, atol=0.1 * rtol)
+        for m in ("auto", "tsit5")
+    )
+    assert auto.statistics.accepted < 0.2 * pair.statistics.accepted
+    np.testing.assert_allclose(auto.outputs, pair.outputs, rtol=0, atol=1e3 * rtol)
+    times = auto.events["time"].to_numpy()
+    assert max(np.abs(times - t).min() for t in pair.events["time"]) < 1e3 * rtol
 
 
 @nlctl.record

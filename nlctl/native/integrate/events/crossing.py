@@ -270,14 +270,15 @@ def _close(task, lane):
 def _foreseen(task, lane, w, bad, j):
     """Return where the first condition lies in the bracket, -1 if nothing is known of that."""
     # Between both ends where the farther one is right, unless the near side leads away from 0;
-    # otherwise by what is known of the near side: of what is exactly 0 there, nothing.
+    # otherwise by what is known of the near side: of a guard that is exactly 0 there, nothing.
     first = -1.0
     for i in range(task.rows.declared, task.rows.switching):
         root = -1.0
         now, end = w.events.g_low[i, j], w.events.g_high[i, j]
         leads_away = lane.low > 0.0 and abs(now) > abs(w.events.g_start[i, j])
         right = (lane.right_high or lane.low == 0.0) and not leads_away
-        if has_crossed(task, w, i, end, j) and right and now != 0.0:
+        unknown = i >= task.rows.guarded and now == 0.0
+        if has_crossed(task, w, i, end, j) and right and not unknown:
             root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
         elif lane.low > 0.0:
             root = _extrapolated(lane, w, i, j)

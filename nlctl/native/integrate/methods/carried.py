@@ -10,20 +10,20 @@ import numba
 import numpy as np
 
 from ..state import INNER, opposite
-from .crossings import first_crossing, is_followed, root_of
+from .crossings import first_crossing, is_followed, part_behind_root
 from .dips import value_and_slope
 
 
 @numba.njit(**INNER)
-def becoming(task, w, i):
+def memory_row(task, w, i):
     """Return the row of coefficients of what a memory would become."""
     return w.x.shape[0] + task.rows.switching + i
 
 
 @numba.njit(**INNER)
-def changing(task, w, i):
+def memory_rate_row(task, w, i):
     """Return the row of coefficients of its derivative."""
-    return becoming(task, w, i) + task.rows.memory.size
+    return memory_row(task, w, i) + task.rows.memory.size
 
 
 @numba.njit(**INNER)
@@ -31,23 +31,23 @@ def fill_slopes(task, w, j):
     """Fill the coefficients of memories' derivatives from those of what they would become."""
     terms, highest = w.taylor.terms, task.taylor.highest - 1
     for i in range(task.rows.memory.size):
-        row, slope = becoming(task, w, i), changing(task, w, i)
+        row, slope = memory_row(task, w, i), memory_rate_row(task, w, i)
         for k in range(highest):
             terms[k, slope, j] = (k + 1.0) * terms[k + 1, row, j]
         terms[highest, slope, j] = 0.0
 
 
 @numba.njit(**INNER)
-def first_turn(task, lane, w, j):
+def foreseen_turn(task, lane, w, j):
     """Return the part of a step that ends right behind the first turn of a memory, 1 for none."""
     first, terms, highest = 1.0, w.taylor.terms, task.taylor.highest - 2
     rest = 0.15 * np.sqrt(task.rtol)  # half of what is allowed: see `location.locate`
     for i in range(task.rows.memory.size):
-        start, row = w.memories.rate_start[i, j], changing(task, w, i)
+        start, row = w.memories.rate_start[i, j], memory_rate_row(task, w, i)
         end = value_and_slope(highest, lane.step, terms, row, j)[0]
         if opposite(start, end) and opposite(terms[0, row, j], end):
             ends = terms[0, row, j], end
-            root = root_of(highest, lane.step, terms, row, ends, rest, j)
+            root = part_behind_root(highest, lane.step, terms, row, ends, rest, j)
             first = min(first, root * (1.0 + rest))
     return first
 
@@ -56,7 +56,7 @@ def first_turn(task, lane, w, j):
 def turns_until(task, lane, w, until, j):
     """Return before which part of a step memories turn that have turned at its end."""
     for i in range(task.rows.memory.size):
-        row, terms = changing(task, w, i), w.taylor.terms
+        row, terms = memory_rate_row(task, w, i), w.taylor.terms
         first = terms[0, row, j]
         end = value_and_slope(task.taylor.highest - 2, w.h[j], terms, row, j)[0]
         if opposite(w.memories.rate_start[i, j], end) and opposite(first, end):
@@ -70,7 +70,7 @@ def turns_inside(task, w, until, j):
     """Return the part of a step at which a memory turns and turns again, 1 for nowhere."""
     first, terms, highest = 1.0, w.taylor.terms, task.taylor.highest - 2
     for i in range(task.rows.memory.size):
-        start, row = w.memories.rate_start[i, j], changing(task, w, i)
+        start, row = w.memories.rate_start[i, j], memory_rate_row(task, w, i)
         if start == 0.0:
             continue
         if not is_followed(highest, w.h[j], terms, row, j):

@@ -8,7 +8,7 @@ from ..state import INNER, opposite
 from .dips import first_dip, lacking, value_and_slope
 
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
-LOOKS = 16  # parts of a step
+PLACES_LOOKED_AT = 16  # parts of a step
 _TURNS = 5  # attempts at where a polynomial is least
 
 
@@ -60,8 +60,8 @@ def first_crossing(p, h, terms, row, side, until, shifted, j):
     if extent * h < abs(terms[0, row, j]):
         return first, farthest
     fell, part = False, 0.0
-    for n in range(LOOKS + 1):
-        before, part = part, n / LOOKS
+    for n in range(PLACES_LOOKED_AT + 1):
+        before, part = part, n / PLACES_LOOKED_AT
         if before >= until:
             break
         value, slope = value_and_slope(p, part * h, terms, row, j)
@@ -91,7 +91,7 @@ def side_left_to(p, terms, row, j):
 
 
 @numba.njit(**INNER)
-def root_of(p, h, terms, row, ends, rest, j):
+def part_behind_root(p, h, terms, row, ends, rest, j):
     """Return right behind which part of a step h a polynomial is 0, by its values at both ends."""
     low, high = 0.0, 1.0
     f_low, f_high = ends

@@ -26,8 +26,15 @@ from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
-from .carried import becoming, fill_slopes, first_turn, turns_inside, turns_until
-from .crossings import LOOKS, first_crossing, is_at, is_followed, root_of, side_left_to
+from .carried import fill_slopes, foreseen_turn, memory_row, turns_inside, turns_until
+from .crossings import (
+    PLACES_LOOKED_AT,
+    first_crossing,
+    is_at,
+    is_followed,
+    part_behind_root,
+    side_left_to,
+)
 from .dips import value_and_slope
 
 SLOPES = 2  # slopes at both ends of a step
@@ -215,7 +222,7 @@ def _aim(task, lanes, w):
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
             if _meets(task, w, i, w.ahead.g[i, j], j):
                 ends = w.events.g_start[i, j], w.ahead.g[i, j]
-                root = root_of(
+                root = part_behind_root(
                     task.taylor.highest - 1, lane.step, w.taylor.terms, w.x.shape[0] + i, ends,
                     _rest(task, i), j,
                 )  # fmt: skip
@@ -225,7 +232,7 @@ def _aim(task, lanes, w):
             elif i < task.rows.declared and opposite(w.events.g_start[i, j], w.ahead.g[i, j]):
                 first = min(first, _farthest(task, w, i, lane.step, j))
         if lane.tries == 0 and lane.across == 0:
-            first = min(first, first_turn(task, lane, w, j))
+            first = min(first, foreseen_turn(task, lane, w, j))
         if 0.0 < first < 1.0:
             lane.step *= first
             lane.ends = 0
@@ -238,10 +245,10 @@ def _farthest(task, w, i, h, j):
     # it is behind nowhere.
     p, row, start = task.taylor.highest - 1, w.x.shape[0] + i, w.events.g_start[i, j]
     part, most = 1.0, abs(start) + SMALL_KINK * task.atol
-    for n in range(1, LOOKS):
-        f = value_and_slope(p, n / LOOKS * h, w.taylor.terms, row, j)[0]
+    for n in range(1, PLACES_LOOKED_AT):
+        f = value_and_slope(p, n / PLACES_LOOKED_AT * h, w.taylor.terms, row, j)[0]
         if abs(f) > most and not opposite(start, f):
-            part, most = n / LOOKS, abs(f)
+            part, most = n / PLACES_LOOKED_AT, abs(f)
     return part
 
 
@@ -303,9 +310,9 @@ def _compare(task, lane, w, j):
     # ``foreseen`` becomes the first part of the step at which it is, and ``looked`` where it is
     # farthest there, 0 if nothing is; below 0 if that is more than one comparison. Before an event,
     # if there is one: it is located by itself. What changes so fast that its polynomial says little
-    # asks for a shorter step as well. Polynomials are looked at in `LOOKS` places, unless their
-    # terms together are less than the first. A shorter step is not asked for without end: what
-    # begins so near to a kink that rounding cannot tell may go through it.
+    # asks for a shorter step as well. Polynomials are looked at in some places, unless their terms
+    # together are less than the first. A shorter step is not asked for without end: what begins so
+    # near to a kink that rounding cannot tell may go through it.
     events, inside, taylor = w.events, w.inside, w.taylor
     inside.looked[j], inside.foreseen[j] = 0.0, 1.0
     if not taylor.largest[2, j] > 0.0:
@@ -405,7 +412,7 @@ def _defect(task, w, dx, j):
         becomes = w.ahead.m[i, j]
         foreseen = value_and_slope(
             task.taylor.highest - 1, w.inside.looked[j] * w.h[j], w.taylor.terms,
-            becoming(task, w, i), j,
+            memory_row(task, w, i), j,
         )[0]  # fmt: skip
         part = abs(becomes - foreseen) / (task.atol + task.rtol * abs(becomes))
         largest = part if part > largest or part != part else largest
