@@ -108,9 +108,9 @@ def input_output_response(
     method : str or Tableau, optional
         Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default.  Machine code
         has "tsit5", an explicit Runge-Kutta pair of orders 5(4), "rodas5p", a stiff method of
-        orders 5(4), "taylor", Taylor's method for equations without memories that can be written
-        as expressions, "auto", the default, which takes whichever of these gets further with the
-        same work, and an explicit pair of your own as a `nlctl.native.Tableau`.
+        orders 5(4), "taylor", Taylor's method for equations that can be written as expressions,
+        without delays and ideal relays, "auto", the default, which takes whichever of these gets
+        further with the same work, and an explicit pair of your own as a `nlctl.native.Tableau`.
     rtol, atol : float, optional
         Tolerances of the integrator.
     evaluation_times : array_like of shape (k,), optional
