@@ -471,8 +471,8 @@ class TestExample2:
             )
         tail = abs(made.outputs[loop.system.output_index["e"], 10_000:]).max()
         assert tail == pytest.approx(0.09346875724, abs=1e-6)
-        assert made.statistics.events == 8
-        assert made.statistics.turns in (7, 8)  # one may be found in two steps
+        assert made.statistics.events in (8, 9)  # rounding where a memory has turned may be one
+        assert made.statistics.turns in (7, 8)  # one may be located in two steps
 
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_the_error_falls_with_the_tolerance(self, loop, method):

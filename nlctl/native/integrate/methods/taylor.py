@@ -330,10 +330,7 @@ def _compare(task, lane, w, j):
     if again < 1.0:
         inside.looked[j], inside.foreseen[j] = -1.0, again
     for i in range(task.rows.switching):
-        follows = is_followed(p, w.h[j], taylor.terms, n + i, j)
-        if until == 1.0 and w.h[j] > 1e6 * _shortest(task):  # nothing jumps before the end
-            follows &= is_at(p, w.h[j], taylor.terms, n + i, events.g[i, j], j)
-        if not follows:
+        if not _follows(task, w, i, until, j):
             inside.looked[j], inside.foreseen[j] = -1.0, 0.5
         elif not opposite(events.g_start[i, j], events.g[i, j]):
             side = events.g_start[i, j]
@@ -356,6 +353,17 @@ def _compare(task, lane, w, j):
         if first < until:
             inside.looked[j] = -1.0 if inside.looked[j] != 0.0 else farthest
             inside.foreseen[j] = min(inside.foreseen[j], first)
+
+
+@numba.njit(**INNER)
+def _follows(task, w, i, until, j):
+    """Whether the polynomial of a switching function says what it is within a lane's step."""
+    p, row = task.taylor.highest - 1, w.x.shape[0] + i
+    if not is_followed(p, w.h[j], w.taylor.terms, row, j):
+        return False
+    if until < 1.0 or w.h[j] <= 1e6 * _shortest(task):
+        return True  # something jumps before the end, or rounding has a say there
+    return is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], j)
 
 
 @numba.njit(**INNER)
