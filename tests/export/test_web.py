@@ -177,6 +177,7 @@ def test_integers_that_are_given_steer_functions_of_time_as_those_of_the_diagram
     assert given.module == own.module
 
 
+@pytest.mark.ci
 def test_a_fault_that_is_switched_on_begins_when_it_is_said(in_node):
     loop, onset = faulty(), "fault_actuator_v.onset"
     program = web_program(loop, TIMES)
