@@ -7,6 +7,7 @@ what is left of such noise is within the tolerance, and a run has no end of thes
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -19,11 +20,20 @@ ROUGH = (
 )
 _WAYS = (0.0, 4.0, -4.0, 16.0)  # distances to the next number by which states are moved
 _PART = 0.1  # of the tolerance in one step
+_HARDLY = 1e-6  # of a rate
 
 
 def next_to(x: np.ndarray, ways: float = _WAYS[1]) -> np.ndarray:
     """Return a state that is as good as the same, of the same shape."""
     return x + ways * np.spacing(x)
+
+
+def _noise(rates: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
+    """Return by how much rates change with the rounding of states, 0 where they hardly do."""
+    # Large rates have large last digits: those of a run that diverges are no noise.
+    here = rates(x)
+    noise = np.max([np.abs(rates(next_to(x, way)) - here) for way in _WAYS], axis=0)
+    return np.where(noise > _HARDLY * np.abs(here), noise, 0.0 * noise)
 
 
 def rough_state(
@@ -38,10 +48,7 @@ def rough_state(
     """
     if not points:
         return None
-    noise = np.array([
-        np.max([np.abs(rates(t, next_to(x, way)) - rates(t, x)) for way in _WAYS], axis=0)
-        for t, x in points
-    ])  # fmt: skip
+    noise = np.array([_noise(partial(rates, t), x) for t, x in points])
     share = length * np.median(noise, axis=0) / scale
     i = int(np.nanargmax(share)) if np.isfinite(share).any() else 0
     return i if share.size and share[i] >= _PART else None
