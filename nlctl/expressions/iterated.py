@@ -12,7 +12,7 @@ import ast
 import functools
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Sized
 from typing import Any
 
 import numpy as np
@@ -92,7 +92,8 @@ class PassWriter(ast.NodeTransformer):
             over = ast.UnaryOp(ast.Not(), call("next_pass", ast.Constant(False)))
             counted: list[ast.stmt] = [ast.If(over, [ast.Break()], [])]
             target = ast.Name(item, ast.Store())
-            loop = ast.For(target, node.iter, self._tried(name, counted + first + body), [])
+            items = call("items", node.iter)
+            loop = ast.For(target, items, self._tried(name, counted + first + body), [])
         begin = ast.Assign([ast.Name(name, ast.Store())], call_instead("loop"))
         whole: list[ast.stmt] = [begin, loop, ast.Expr(call("end"))]
         if node.orelse:
@@ -273,6 +274,12 @@ class Loop:
         self.others: dict[str, Any] = {}
         self.names: Sequence[str] = ()
         self.guards, self.size, self.is_cut = 0, len(graph.nodes), False
+        self.is_short = False  # so few passes that all are written out, however long these are
+
+    def items(self, values: Any) -> Any:
+        """Note of how many items the passes are."""
+        self.is_short = not isinstance(values, Sized) or len(values) <= WRITTEN_PASSES
+        return values
 
     def next_pass(self, is_endless: bool = True) -> bool:
         """Count passes; there is none after too many of a number that is not known."""
@@ -284,7 +291,7 @@ class Loop:
         if self.running.op == "const":
             return True
         size = len(self.graph.nodes) - self.size
-        is_large = size > _LONG and self.passes > _FEWEST
+        is_large = size > _LONG and self.passes > _FEWEST and not self.is_short
         is_long = is_large or (is_endless and self.passes > WRITTEN_PASSES)
         self.is_cut |= is_long
         return not is_long
