@@ -8,13 +8,9 @@ from .problem import Problem, Solver
 
 
 def solvers(problem: Problem) -> list[Solver]:
-    """Return nlctl's solvers; Taylor's method does not integrate the backlash of Example 2."""
+    """Return nlctl's solvers."""
     methods = {"nlctl": "auto", "nlctl, Taylor": "taylor"}
-    return [
-        solver(problem, name, method)
-        for name, method in methods.items()
-        if problem.example == 1 or method == "auto"
-    ]
+    return [solver(problem, name, method) for name, method in methods.items()]
 
 
 def solver(problem: Problem, name: str, method: str) -> Solver:
