@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -10,6 +10,18 @@ from .graph import LINEAR, OF_FACTORS, Expr, needed
 
 # each element of the result depends on all that goes in
 _WHOLE = ("sum", "call", "solve", *LINEAR, *OF_FACTORS)
+
+
+def rows_read(leaf: Expr) -> list[int]:
+    """Return the rows of its array that a leaf reads."""
+    _, start, step = leaf.data
+    return [start + step * i for i in range(leaf.size or 1)]
+
+
+def reads(exprs: Iterable[Expr], array: str, rows: Collection[int]) -> bool:
+    """Whether expressions are made of some rows of an array."""
+    leaves = (node for node in needed(exprs) if node.op == "leaf" and node.data[0] == array)
+    return any(row in rows for leaf in leaves for row in rows_read(leaf))
 
 
 def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np.ndarray:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..expressions.bends import replaced_parts
-from ..expressions.graph import Expr, Graph, needed
+from ..expressions.graph import Expr, Graph
 from .causes import Cause, When
 from .directions import SomeRows
 from .names import StatePlaces
@@ -61,16 +61,7 @@ class Returning:
             now = self._leaving(-1, i)
             before = graph.op("add", now, self._leaving(places.by + 1, i))
             instead[first + i] = graph.op("select", self._arrived(i), before, now)
-        leaves = {}
-        for leaf in needed(exprs):
-            if leaf.op != "leaf" or leaf.data[0] != "u":
-                continue
-            _, start, step = leaf.data
-            rows = [start + step * i for i in range(leaf.size or 1)]
-            if any(row in instead for row in rows):
-                parts = [instead.get(row, graph.leaf("u", row, None)) for row in rows]
-                leaves[leaf] = graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
-        return replaced_parts(graph, exprs, leaves)
+        return replaced_parts(graph, exprs, self.source.leaves(exprs, instead, "u"))
 
     def _move(self, j: int, i: int) -> Expr:
         """Return how the time at which a jump leaves a line moves by a quantity, its delay, too."""

@@ -21,6 +21,7 @@ from ..expressions.arrays import Tracer
 from ..expressions.bends import only_bends, replaced_parts
 from ..expressions.conditions import conditions, switching_function
 from ..expressions.continuity import may_jump
+from ..expressions.dependence import rows_read
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
 from ..native import Compiled
@@ -193,17 +194,18 @@ class EquationParts:
         """Return expressions with others in the places of some states."""
         return replaced_parts(self.graph, exprs, self.leaves(exprs, instead))
 
-    def leaves(self, exprs: Iterable[Expr], instead: Mapping[int, Expr]) -> dict[Expr, Expr]:
-        """Return what stands for the leaves of expressions that read some states."""
+    def leaves(
+        self, exprs: Iterable[Expr], instead: Mapping[int, Expr], array: str = "x"
+    ) -> dict[Expr, Expr]:
+        """Return what stands for the leaves of expressions that read some rows of an array."""
         replacements = {}
         for leaf in needed(exprs):
-            if leaf.op != "leaf" or leaf.data[0] != "x":
+            if leaf.op != "leaf" or leaf.data[0] != array:
                 continue
-            _, start, step = leaf.data
-            rows = [start + step * i for i in range(leaf.size or 1)]
+            rows = rows_read(leaf)
             if not any(row in instead for row in rows):
                 continue
-            parts = [instead.get(r, self.graph.leaf("x", r, None)) for r in rows]
+            parts = [instead.get(r, self.graph.leaf(array, r, None)) for r in rows]
             replacements[leaf] = (
                 self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
             )

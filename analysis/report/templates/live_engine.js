@@ -8,16 +8,6 @@ const unpacked = async (text) => {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 };
 
-// The number after x towards y.
-const nextafter = (x, y) => {
-  if (Number.isNaN(x) || Number.isNaN(y)) return NaN;
-  if (x === y) return y;
-  if (x === 0) return y > 0 ? Number.MIN_VALUE : -Number.MIN_VALUE;
-  const view = new DataView(new ArrayBuffer(8));
-  view.setFloat64(0, x);
-  view.setBigInt64(0, view.getBigInt64(0) + (x < y === x > 0 ? 1n : -1n));
-  return view.getFloat64(0);
-};
 const evenly = (begin, end, count) => {
   const step = (end - begin) / (count - 1);
   const values = Float64Array.from({ length: count }, (_, k) => k * step + begin);
@@ -26,7 +16,7 @@ const evenly = (begin, end, count) => {
 };
 
 const engineOf = async (bytes, facts) => {
-  const provided = { fmod: (x, y) => x % y, nextafter };
+  const provided = { fmod: (x, y) => x % y };
   for (const name of Object.getOwnPropertyNames(Math)) {
     if (typeof Math[name] === "function") provided[name] = Math[name];
   }

@@ -5,16 +5,10 @@ from __future__ import annotations
 HEAP = 1 << 20  # bytes; the integrators ask for a few arrays of flags at a time
 
 HOST = f"""
-declare double @nextafter(double, double)
 @host.heap = internal global [{HEAP} x i8] zeroinitializer, align 64
 @host.top = internal global i64 0
 @host.held = internal global i64 0
 @host.nothing = internal global [4 x i64] zeroinitializer, align 16
-
-define double @numba_nextafter(double %a, double %b) nounwind {{
-  %next = call double @nextafter(double %a, double %b)
-  ret double %next
-}}
 
 ; memory is taken from the heap one behind the other, and all of it is free again when none is held
 define ptr @malloc(i64 %size) nounwind {{

@@ -26,7 +26,7 @@ OF_MATH = (
     "acos", "atan", "asinh", "acosh", "atanh", "cbrt", "atan2", "hypot", "pow",
 )  # fmt: skip
 """Functions of the C library that are JavaScript's ``Math``, by the same names."""
-PROVIDED = frozenset({*OF_MATH, "fmod", "nextafter"})
+PROVIDED = frozenset({*OF_MATH, "fmod"})
 _SCRIPT = Path(__file__).with_name("wasm_object.py")
 _STACK = 1 << 20  # bytes
 _SIZE = """

@@ -12,6 +12,7 @@ from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
+from ...expressions.dependence import reads
 from ...expressions.derivatives import tangents
 from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
@@ -220,20 +221,7 @@ def _undeclared(
 
 def _remembers(function: Expr, node: Node | None) -> bool:
     """Whether a condition asks for a memory of its own block, which stands aside within a step."""
-    memories = set() if node is None else set(memory(node))
-    if not memories:
-        return False
-    leaves = (e for e in needed([function]) if e.op == "leaf" and e.data[0] == "x")
-    return any(memories & set(_places(leaf)) for leaf in leaves)
-
-
-def _places(leaf: Expr) -> range:
-    _, start, step = leaf.data
-    return (
-        range(start, start + 1)
-        if leaf.size is None
-        else range(start, start + step * leaf.size, step)
-    )
+    return node is not None and reads([function], "x", memory(node))
 
 
 def _declares(node: Node) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ParameterError
-from ...expressions.graph import Expr, needed
+from ...expressions.dependence import reads
 from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.plan import Store
 from ..codegen.rewrite import rewritten
@@ -85,11 +85,9 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
     switching, n = reading.program.events + read.conditions.rows, lowered.rows["x"]
     count = len(reading.program.memory)
     changing = range(n + switching + count, n + switching + 2 * count)
-    compared = [*changing, *(row for row, *_ in recurrence.sides)]
+    compared = [*range(n, n + switching), *changing, *(row for row, *_ in recurrence.sides)]
     if is_jit_disabled():
-        prepare, *functions = plain_series(
-            lowered, recurrence, [*range(n, n + switching), *compared], layout
-        )
+        prepare, *functions = plain_series(lowered, recurrence, compared, layout)
     else:
         steps = steps_text(lowered.rows["x"], switching, compared, layout)
         text = "\n".join([lowered.text, taylor_text(recurrence.folds, layout), steps])
@@ -102,22 +100,12 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
             )
             for name, address in loaded.addresses.items()
         )  # fmt: skip
-    memory = set(reading.program.memory)
-    sides = [(a, b, int(_reads(expr, memory))) for a, b, expr in recurrence.sides]
+    memory = reading.program.memory
+    sides = [(a, b, int(reads([expr], "x", memory))) for a, b, expr in recurrence.sides]
     return Series(
         lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout,
         sides=np.array(sides, dtype=np.int64).reshape(-1, 3),
     )  # fmt: skip
-
-
-def _reads(expr: Expr, states: set[int]) -> bool:
-    """Return whether an expression is one of some states."""
-    leaves = (node for node in needed([expr]) if node.op == "leaf" and node.data[0] == "x")
-    return any(
-        start + step * i in states
-        for _, start, step, size in ((*leaf.data, leaf.size or 1) for leaf in leaves)
-        for i in range(size)
-    )
 
 
 def _layout(lowered: Lowered) -> SeriesLayout:

@@ -29,7 +29,7 @@ def steps_text(n: int, switching: int, compared: Sequence[int], layout: SeriesLa
     functions = {
         "growth": ("x c k largest", lambda f: f.growth(n)),
         "step": ("h c k x slope", lambda f: f.step(n)),
-        "judge": ("h x x_new slope dx c k largest", lambda f: f.judge(n, switching, compared)),
+        "judge": ("h x x_new slope dx c k largest", lambda f: f.judge(n, compared)),
         "values": ("h c k g", lambda f: f.values(n, switching)),
     }
     texts = []
@@ -201,7 +201,7 @@ class _Function:
         h = self.b.load("%h", self.lanes if self.lanes > 1 else 0)
         return self.b.wide(h, width) if width else h
 
-    def judge(self, n: int, switching: int, compared: Sequence[int]) -> None:
+    def judge(self, n: int, compared: Sequence[int]) -> None:
         """Write h times the defect, and the last term, over the tolerance."""
         # Both are not finite where a state is not. A third number is above 0 where
         # something that is compared may change its side, or its polynomial is not to be
@@ -223,7 +223,7 @@ class _Function:
 
         greatest = [self.over_lanes(value) for value in self.rows(n, 2, write)]
         doubts = constant(-1.0, self.lanes if self.lanes > 1 else 0)
-        for row, count in runs([*range(n, n + switching), *compared]):
+        for row, count in runs(compared):
             doubts = self._doubts(row, count, self.below(highest), doubts)
         self.write_largest([*greatest, doubts])
 

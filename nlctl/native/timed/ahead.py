@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...expressions.dependence import rows_read
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
 from ..equations.located import Conditions
@@ -43,8 +44,7 @@ class OfTime:
         waves = (slope for wave in found.waves for slope in wave)
         for node in needed([*found.of_time, *found.pulses, *waves]):
             if node.op == "leaf" and node.data[0] == "p":
-                _, start, step = node.data
-                places.update(start + step * i for i in range(node.size or 1))
+                places.update(rows_read(node))
         return np.array(sorted(places), dtype=np.int64)
 
 

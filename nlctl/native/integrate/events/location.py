@@ -41,6 +41,12 @@ def behind_event(rtol):
 
 
 @numba.njit(**INNER)
+def behind_turn(rtol):
+    """Return the part of a step by which it may end behind where a memory turns."""
+    return 0.3 * np.sqrt(rtol)
+
+
+@numba.njit(**INNER)
 def first_root(lane, task, every, w, low, high, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none."""
     # `low` and `high` are values of the switching functions there. Conditions at which something
@@ -88,7 +94,8 @@ def locate(lane, task, w, j):
         return CLEAR
     lane.tries += 1
     # behind a break point stages are wrong by the rest; what a memory misses is quadratic in it
-    tolerance = lane.high * (0.3 * np.sqrt(task.rtol) if memory else behind_event(task.rtol))
+    behind = behind_turn(task.rtol) if memory else behind_event(task.rtol)
+    tolerance = lane.high * behind
     is_behind = lane.high == lane.step
     if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):
         return EVENT

@@ -169,10 +169,7 @@ def _any_moves(task, w, j):
         for n in range(1, 5):
             least, most = min(least, w.sharp.at[n, i, j]), max(most, w.sharp.at[n, i, j])
         kind, apart = task.sharp.kinds[i], most - least
-        if kind not in (
-            ITSELF,
-            WAVE,
-        ):  # between two of the values it may be nearer to 0, and farther
+        if kind not in (ITSELF, WAVE):  # between two values it may be nearer to 0, and farther
             nearest = max(max(least, -most) - apart, 0.0)
             if nearest > max(kind, 1) * apart:
                 continue

@@ -7,8 +7,8 @@ as well: it is carried along until that derivative changes its sign.
 from __future__ import annotations
 
 import numba
-import numpy as np
 
+from ..events.location import behind_turn
 from ..state import INNER, opposite
 from .crossings import first_crossing, is_followed, part_behind_root
 from .dips import value_and_slope
@@ -41,7 +41,7 @@ def fill_slopes(task, w, j):
 def foreseen_turn(task, lane, w, j):
     """Return the part of a step that ends right behind the first turn of a memory, 1 for none."""
     first, terms, highest = 1.0, w.taylor.terms, task.taylor.highest - 2
-    rest = 0.15 * np.sqrt(task.rtol)  # half of what is allowed: see `location.locate`
+    rest = 0.5 * behind_turn(task.rtol)
     for i in range(task.rows.memory.size):
         start, row = w.memories.rate_start[i, j], memory_rate_row(task, w, i)
         end = value_and_slope(highest, lane.step, terms, row, j)[0]

@@ -102,7 +102,8 @@ def expand(task, lanes, w):
     call_growth(series[_GROWTH], w.x, task.taylor.c, taylor.terms, taylor.largest)
     for j in range(lanes.size):
         lane = lanes[j]
-        fill_slopes(task, w, j)
+        if taylor.expanded[j] == 0:
+            fill_slopes(task, w, j)
         if taylor.expanded[j] == 0 and lane.status == RUNNING and _lacks_terms(task, w, j):
             lane.status = METHOD if task.alone else STIFF
         if taylor.expanded[j] == 0 and task.fixed == 0.0:
