@@ -71,7 +71,7 @@ def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
         work.past.t[k], work.past.h[k] = piece.start, piece.length
         work.past.powers[k, told] = piece.powers[:, :, None]
         work.past.level[k, told] = 0 if piece.breaks else SMOOTH
-    work.past.kept[:], work.past.shown_to[:] = len(found), -1
+    work.past.kept[:], work.past.shown_to[:], work.past.until[:] = len(found), -1, begin
     for row in range(len(read)):
         for j in range(lanes):
             starts = work.past.t[: len(found), j]

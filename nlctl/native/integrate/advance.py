@@ -36,7 +36,7 @@ from .methods.dense import solution_at
 from .methods.stiff import UNKNOWN, stiff_attempt
 from .methods.turn import is_to_change
 from .resets import fall
-from .restart import memory_rates, restart
+from .restart import continue_behind_kinks, memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
 from .state import AUTO, DERIVATIVES, ENDED, INNER, METHOD, RUNNING, is_stiff, opposite
 
@@ -117,6 +117,8 @@ def _accept(task, lanes, w, found, done, passed):
         done[j] = True
         if memories:  # at a break point of the inputs memories may reverse as well
             at_break_point = lane.ends and w.u.shape[0] > 0
+            if task.lines.delays.shape[0]:  # what arrives there is known, see `keep`
+                at_break_point = task.inputs.shape[0] > 0 and lane.t == task.times[lane.segment]
             passed[j] = at_break_point or _began_to_move(w, j)
         passed[j] |= event
         any_passed |= passed[j]
@@ -228,6 +230,8 @@ def _jump(rhs, task, lanes, w, done, passed, sampled, any_passed):
     again = memories and any_passed
     if task.lines.delays.shape[0]:
         again |= keep(task, lanes, w, done, passed)
+        if memories and w.past.bends.any():
+            again |= continue_behind_kinks(rhs, task, lanes, w, passed)
     elif not memories:
         passed[:] = False
     again |= _happens(task, lanes, w, passed, sampled)

@@ -38,7 +38,8 @@ class KeptSignals(NamedTuple):
     first: Places2  # (lines, lanes): the break that has arrived last
     next: Places2  # and that will arrive next, -1 if none is known
     fresh: Places2  # which derivative jumps now
-    since: Reals1  # when the step being tried began
+    until: Reals1  # where the polynomials that are kept end
+    bends: Places1  # whether a kink arrives at the end of a step
     seen: Reals3  # outputs and signals at nodes of that step
     tried: Reals3  # its polynomials
     missed: Reals1  # what these miss, over its tolerance; -1 where it is a jump
@@ -55,9 +56,9 @@ def new_past(times: int, outputs: int, lines: int, lanes: int) -> KeptSignals:
         powers=(0, lines, DEGREE + 1, lanes),
         **dict.fromkeys(("t", "h"), (0, lanes)),
         level=(0, lines, lanes),
-        **dict.fromkeys(("kept", "shown_to"), (lanes,)),
+        **dict.fromkeys(("kept", "shown_to", "bends"), (lanes,)),
         **dict.fromkeys(("first", "next", "fresh"), (lines, lanes)),
-        **dict.fromkeys(("since", "missed", "missed_at_end"), (lanes,)),
+        **dict.fromkeys(("until", "missed", "missed_at_end"), (lanes,)),
         seen=(DEGREE + 3 if lines else 0, outputs, lanes),
         tried=(lines, DEGREE + 1, lanes),
         shown=(times, lines, lanes),
@@ -147,3 +148,13 @@ def past_value(task, w, i, j, t):
     for n in range(DEGREE - 1, -1, -1):
         value = value * z + past.powers[k, i, n, j]
     return value
+
+
+@numba.njit(**INNER)
+def next_arrival(task, w, j):
+    """Return when the next break that is known leaves a line of a lane, inf if none is known."""
+    first, past = np.inf, w.past
+    for i in range(task.lines.delays.shape[0]):
+        if past.next[i, j] >= 0:
+            first = min(first, arrival(task, i, j, past.t[past.next[i, j], j]))
+    return first

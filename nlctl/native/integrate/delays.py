@@ -22,7 +22,7 @@ import numpy as np
 
 from ..machine.address import call_out
 from .control import rejected
-from .delayed import DEGREE, arrival, past_value, piece_at, sent
+from .delayed import DEGREE, arrival, next_arrival, past_value, piece_at, sent
 from .evaluate import inputs_at
 from .methods import explicit
 from .state import INNER, RUNNING
@@ -49,6 +49,7 @@ POWERS = _powers_at([Fraction(float(z)) for z in 2 * POINTS - 1])  # z = 2 theta
 IN_CHEBYSHEV = 2.0 ** (1 - DEGREE)  # of a power of z in the Chebyshev polynomial of the same degree
 JUMP = 1e-10  # of the time: a step so short that its signals still bend in has a jump inside
 ROUNDING = 1e-15  # of the time: two breaks so close are one
+CONNECTED = 10.0  # times the tolerance: what polynomials may miss of a signal that has not jumped
 PAST_PIECES = 4  # pieces of the past that a step reads at most
 
 
@@ -56,11 +57,9 @@ PAST_PIECES = 4  # pieces of the past that a step reads at most
 def next_break(task, w, lane, j, stop):
     """Return where a step must end for the delays of a lane, at `stop` at the latest."""
     lines = task.lines
-    first = stop
+    first = min(stop, next_arrival(task, w, j))
     for i in range(lines.delays.shape[0]):
         first = min(first, arrival(task, i, j, lane.t), _read(task, w, lane, i, j))
-        if w.past.next[i, j] >= 0:
-            first = min(first, arrival(task, i, j, w.past.t[w.past.next[i, j], j]))
         for k in range(lines.kinks.shape[1] if lines.varied[i] else 0):
             if lines.kinks[i, k] > lane.t:
                 first = min(first, lines.kinks[i, k])
@@ -97,7 +96,7 @@ def look_within(task, lanes, w):
     for s in range(DEGREE + 1):
         for j in range(lanes.size):
             w.t[j] = lanes[j].t + POINTS[s] * lanes[j].step
-            past.since[j], past.missed[j], past.missed_at_end[j] = lanes[j].t, 0.0, 0.0
+            past.missed[j], past.missed_at_end[j] = 0.0, 0.0
             explicit.interpolate(POINTS[s], lanes[j].step, w.x, w.k, task.pair.B, j, w.x_stage)
         inputs_at(task, lanes, w)
         call_out(task.lines.signals[0], w.t, w.x_stage, w.u, task.p, past.seen[s])
@@ -142,15 +141,17 @@ def _fit(task, w, j):
 def unresolved(task, lane, w, j, event):
     """Whether polynomials miss too much of a step in which nothing else is wrong."""
     # A jump that no switching function tells of is driven into a very short step, and accepted.
-    # Right behind an event the signal at the end says nothing of the step.
+    # Right behind an event the signal at the end says nothing of the step; and nothing is asked of
+    # a step across a condition: its polynomials have both sides in them, see `keep`.
     past = w.past
+    if event and lane.across:
+        past.missed[j] = -1.0
+        return False
     if not event and not past.missed_at_end[j] <= past.missed[j]:
         past.missed[j] = past.missed_at_end[j]
     short = lane.step <= JUMP * max(abs(lane.t), task.lines.delays[0, j])
     if short and past.missed[j] > 1.0:
         past.missed[j] = -1.0
-        for i in range(task.lines.delays.shape[0]):
-            past.fresh[i, j] = 0
         return False
     if rejected(lane, past.missed[j], task):
         return True
@@ -165,9 +166,11 @@ def keep(task, lanes, w, done, passed):
     # events if there are memories. Return whether a jump arrives in any lane.
     jumped = False
     for j in range(lanes.size):
+        w.past.bends[j] = 0
         if not done[j]:
             continue
-        _append(task, lanes[j], w, j)
+        if not w.past.missed[j] < 0.0 and lanes[j].t > w.past.until[j]:
+            _append(task, lanes[j], w, j)
         _show(task, lanes[j], w, j, False)
         broke = 0 if passed[j] or w.past.missed[j] < 0.0 else SMOOTH
         if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
@@ -177,8 +180,10 @@ def keep(task, lanes, w, done, passed):
         for i in range(task.lines.delays.shape[0]):
             w.past.fresh[i, j] = broke
         _bend(task, lanes[j], w, j)
-        jumps = _arrive(task, lanes[j], w, j)
+        arrives = _arrive(task, lanes[j], w, j)
+        jumps = arrives == 0
         jumped |= jumps
+        w.past.bends[j] = arrives == 1 and task.rows.memory.size > 0
         passed[j] = jumps or (passed[j] and task.rows.memory.size > 0)
         _show(task, lanes[j], w, j, True)
     return jumped
@@ -193,16 +198,42 @@ def is_due(task, lane, j):
 
 @numba.njit(**INNER)
 def _append(task, lane, w, j):
+    """Keep what the signals of a lane were since the polynomials that are kept end."""
     past = w.past
     k = past.kept[j]
-    past.t[k, j], past.h[k, j] = past.since[j], lane.t - past.since[j]
+    past.t[k, j], past.h[k, j] = past.until[j], lane.t - past.until[j]
     for i in range(task.lines.delays.shape[0]):
         for n in range(DEGREE + 1):
             past.powers[k, i, n, j] = past.tried[i, n, j]
+        if k > 0:
+            _connect(task, past, k, i, j)
         past.level[k, i, j] = past.fresh[i, j]
         if past.fresh[i, j] < SMOOTH and past.next[i, j] < 0:
             past.next[i, j] = k
-    past.kept[j] = k + 1
+    past.kept[j], past.until[j] = k + 1, lane.t
+
+
+@numba.njit(**INNER)
+def _connect(task, past, k, i, j):
+    """Let a polynomial begin where the one before it ends, unless the signal has jumped there."""
+    # What both miss is within the tolerance; but a memory that is carried would reverse at the
+    # smallest step back. Where anything has happened the signal may have jumped, or bent, or not.
+    end, begin, rise, rise_before, sign = 0.0, 0.0, 0.0, 0.0, 1.0
+    for n in range(DEGREE + 1):
+        end += past.powers[k - 1, i, n, j]
+        rise_before += n * past.powers[k - 1, i, n, j]
+        begin += sign * past.powers[k, i, n, j]
+        rise -= n * sign * past.powers[k, i, n, j]
+        sign = -sign
+    tolerance = CONNECTED * (task.atol + task.rtol * max(abs(end), abs(begin)))
+    if not abs(end - begin) <= tolerance:
+        return
+    past.powers[k, i, 0, j] += 0.5 * (end - begin)
+    past.powers[k, i, 1, j] -= 0.5 * (end - begin)
+    longest = max(past.h[k, j], past.h[k - 1, j])
+    bend = longest * abs(rise / past.h[k, j] - rise_before / past.h[k - 1, j])
+    level = 2 if bend <= DEGREE * DEGREE * tolerance else 1
+    past.fresh[i, j] = max(past.fresh[i, j], level)
 
 
 @numba.njit(**INNER)
@@ -233,16 +264,15 @@ def _bend(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _arrive(task, lane, w, j):
-    """Go behind the breaks that arrive now; return whether a signal jumps."""
-    past = w.past
-    jumps = False
+    """Go behind the breaks that arrive now; return which derivative jumps, SMOOTH if none does."""
+    past, lowest = w.past, SMOOTH
     for i in range(task.lines.delays.shape[0]):
         while past.next[i, j] >= 0:
             k = past.next[i, j]
             if arrival(task, i, j, past.t[k, j]) > lane.t + ROUNDING * abs(lane.t):
                 break
             level = past.level[k, i, j]
-            jumps |= level == 0
+            lowest = min(lowest, level)
             for other in range(task.lines.delays.shape[0]):
                 behind = level if task.lines.direct[other, i] else level + 1
                 past.fresh[other, j] = min(past.fresh[other, j], behind)
@@ -251,7 +281,7 @@ def _arrive(task, lane, w, j):
                 if past.level[later, i, j] < SMOOTH:
                     past.next[i, j] = later
                     break
-    return jumps
+    return lowest
 
 
 @numba.njit(**INNER)

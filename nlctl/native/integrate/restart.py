@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .delayed import arrival
+from .delayed import arrival, next_arrival
 from .evaluate import evaluate
 from .events.functions import begin_next
 from .samples import time_rounding
@@ -13,6 +13,7 @@ from .state import INNER, opposite
 
 FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
+AT_BREAK = 0.01  # of what is looked ahead: nearer, a break is at hand
 _NEARER = 1e-6  # the same of long steps, by Taylor's method
 _NEAREST = 1e-10  # and of a run
 
@@ -21,13 +22,17 @@ _NEAREST = 1e-10  # and of a run
 def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill w.memories with the rates at which memories would be carried along."""
     # A difference over a small part of the step: its error moves the turning point by so little
-    # that the turning value does not change. Where functions of t alone jump, it is taken
-    # backwards. Where a break point lies in between, it says nothing: a relay is about to jump.
+    # that the turning value does not change. Where functions of t alone jump, or a break of a
+    # delayed signal arrives, it is taken backwards. Where a break point lies in between, it says
+    # nothing: a relay is about to jump.
     ahead, memories = w.ahead, w.memories
     for j in range(lanes.size):
-        w.t[j] = ahead.begin[j] + _far(task, lanes[j].h)
-        if w.t[j] > lanes[j].left:
-            w.t[j] = ahead.begin[j] - _far(task, lanes[j].last)
+        far, gap = _far(task, lanes[j].h), next_arrival(task, w, j) - ahead.begin[j]
+        w.t[j] = ahead.begin[j] + far
+        if far > gap > AT_BREAK * far:
+            w.t[j] = ahead.begin[j] + 0.5 * gap
+        elif w.t[j] > lanes[j].left or far > gap:
+            w.t[j] = ahead.begin[j] - min(far, lanes[j].step)
         away = w.t[j] - ahead.begin[j]  # what is left of it after rounding
         w.h[j] = away
         for i in range(x.shape[0]):
@@ -97,6 +102,29 @@ def restart(rhs, task, lanes, w, chosen):
     for j in range(lanes.size):
         if chosen[j]:
             begin_next(task, w, j)
+
+
+@numba.njit(**INNER)
+def continue_behind_kinks(rhs, task, lanes, w, passed):
+    """Let memories move on where a kink arrives, or resume there: add these lanes to `passed`."""
+    # A memory that is carried further in the same direction, or stands still as before, needs no
+    # more than its rate behind the kink. Return whether any lane is to resume.
+    memories, again = w.memories, False
+    saved = memories.rate.copy()
+    for j in range(lanes.size):
+        w.ahead.begin[j] = lanes[j].t
+    memory_rates(rhs, task, lanes, w, w.x, w.k[0])
+    for j in range(lanes.size):
+        for i in range(memories.rate.shape[0]):
+            bent, rate = memories.rate[i, j], memories.rate_start[i, j]
+            memories.rate[i, j] = saved[i, j]
+            if not w.past.bends[j] or passed[j]:
+                continue
+            if np.sign(bent) == np.sign(rate):
+                memories.rate_start[i, j] = bent
+            else:
+                passed[j] = again = True
+    return again
 
 
 @numba.njit(**INNER)
