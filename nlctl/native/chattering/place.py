@@ -152,4 +152,7 @@ def _switching_function(compiled: Compiled, i: int, p: np.ndarray, jump: Jump) -
 
 
 def _between(label: str, block: str, one: float, other: float) -> str:
-    return f"'{label}' of block '{block}' jumps between {one + 0.0:.6g} and {other + 0.0:.6g}"
+    between = f"between {one + 0.0:.6g} and {other + 0.0:.6g}"
+    if f"{one:.6g}" == f"{other:.6g}":  # as in a run that diverges, where rounding is that large
+        between = f"by {abs(other - one):.3g} at {one:.6g}"
+    return f"'{label}' of block '{block}' jumps {between}"
