@@ -31,7 +31,7 @@ from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
 from nlctl.native.machine import machine_code as machine_code_module
 from nlctl.native.machine.calls import loaded
-from nlctl.native.machine.fingerprint import function_key, module_key, program_key
+from nlctl.native.machine.fingerprint import function_key, module_key
 from nlctl.native.machine.machine_code import TEACHERS, Wanted, kept, machine_code
 from nlctl.native.opaque.called import Source
 
@@ -302,10 +302,11 @@ class TestMachineCode:
 
     def test_a_program_runs_from_its_own_source(self, folder):
         """Sources on disk are not looked at, and a traceback shows the line."""
-        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={})
+        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={"np": np})
         folder.mkdir(mode=0o700)
-        (folder / f"nlctl_program_{program_key(program)}.py").write_text("raise SystemExit")
-        module = loaded(program, {})
+        key = function_key(program.source, program.names)
+        (folder / f"nlctl_program_{key}.py").write_text("raise SystemExit")
+        module = loaded(program)
         assert module.__name__ in sys.modules
         with pytest.raises(TypeError) as caught:
             module.rhs(0.0)

@@ -187,3 +187,7 @@ def test_wrong_questions_are_refused_by_name():
     hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="u", outputs="v", name="hold"))
     with pytest.raises(nlctl.errors.UsageError, match="'actuator'"):
         nlctl.find_operating_point(through(hold), 0.0, 1.0)
+    with pytest.raises(nlctl.errors.ParameterError, match="'inputs' is given twice, as inputs= "):
+        nlctl.find_operating_point(pendulum(), 0.0, 0.0, u0=1.0)
+    with pytest.raises(nlctl.errors.UnknownKeywordError, match="nearest: 'x0'"):
+        nlctl.find_operating_point(pendulum(), xO=1.0)

@@ -45,10 +45,6 @@ class Source:
     source: str
     names: Mapping[str, Any]
 
-    def namespace(self, *, native: bool) -> dict[str, Any]:
-        """Return everything that the source refers to, by name."""
-        return {"np": np, "carray": carray, "equation": equation, **self.names}
-
 
 @dataclass(frozen=True, kw_only=True)
 class Call:
@@ -218,7 +214,8 @@ def _source(name: str, stands: _AsItStands, system: System) -> Source:
         lines += [f"    values = as_vector({call}, {counts[k]})"]
         lines += [f"    y[{at + j}] = values[{j}]" for j in range(counts[k])]
         at += counts[k]
-    names = {"record": record, "as_vector": as_vector, "read_by_keys": read_by_keys}
+    names = {"np": np, "carray": carray, "equation": equation, "record": record}
+    names |= {"as_vector": as_vector, "read_by_keys": read_by_keys}
     names |= {f"fixed{i}": callable_constant(stands.template[k]) for i, k in enumerate(fixed)}
     names |= {f"function{k}": _jitted(frozen(f)) for k, f in enumerate(stands.functions)}
     return Source(source="\n".join([*lines, ""]), names=names)
