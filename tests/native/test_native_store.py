@@ -86,7 +86,7 @@ def code(key="cubed", function=cubed, **options):
     """A compiled function, and how many compilations it took."""
     wanted = Wanted(function=function, signature=REAL, options={"error_model": "numpy", **options})
     with event.install_recorder("numba:compile") as recorder:
-        (made,) = machine_code(key, [wanted])
+        made = machine_code(key, wanted)
     return made, sum(e.is_start for _, e in recorder.buffer)
 
 
@@ -258,9 +258,9 @@ class TestMachineCode:
         elif damage == "pickle":  # whole, but names what does not exist here
             store.write(file.stem, b"cmissing_module\nname\n.")
         elif damage == "library":  # whole, but no code that LLVM can read
-            ((library, *rest),) = pickle.loads(store.read(file.stem))
+            library, *rest = pickle.loads(store.read(file.stem))
             broken = (*library[:2], (library[2][0], b"no bitcode"))
-            store.write(file.stem, pickle.dumps([(broken, *rest)]))
+            store.write(file.stem, pickle.dumps((broken, *rest)))
         else:
             flipped = bytearray(content)
             flipped[len(content) // 2] ^= 1
@@ -277,7 +277,7 @@ class TestMachineCode:
         code()
         code(fastmath=True)
         wanted = Wanted(function=cubed, signature=numba.float32(numba.float32), options={})
-        machine_code("cubed", [wanted])
+        machine_code("cubed", wanted)
         assert len(list(folder.iterdir())) == 3
 
     def test_code_for_each_type_of_arguments(self, folder):
