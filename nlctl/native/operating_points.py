@@ -299,7 +299,7 @@ def _place(kind: str, each: object, names: Sequence[str]) -> int:
         raise ParameterError(f"{_WHO} needs places or names of each {kind}, got {each!r}")
     if not 0 <= each < len(names):
         raise ParameterError(
-            f"{_WHO} got {each} for the place of an {kind}: there are {len(names)}, from 0 on"
+            f"{_WHO} got {each} for a place of the {kind}s: there are {len(names)}, from 0 on"
         )
     return int(each)
 

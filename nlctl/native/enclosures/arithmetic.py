@@ -248,10 +248,10 @@ def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
 
 
 def logic_not(b: Body, x: Ends) -> Ends:
-    return Ends(low=_not(b, x.high), high=_not(b, x.low))
+    return Ends(low=negated(b, x.high), high=negated(b, x.low))
 
 
-def _not(b: Body, v: Value) -> Value:
+def negated(b: Body, v: Value) -> Value:
     return b.logic("xor", v, constant(True, v.width, "b"))
 
 
@@ -266,4 +266,4 @@ def logic(b: Body, op: str, x: Ends, y: Ends) -> Ends:
 
 def left_open(b: Body, condition: Ends) -> Value:
     """Return where a condition is open."""
-    return b.logic("and", condition.high, _not(b, condition.low))
+    return b.logic("and", condition.high, negated(b, condition.low))

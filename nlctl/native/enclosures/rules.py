@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from ..codegen.ir.functions import applied
-from ..codegen.ir.text import Body, Value, constant
+from ..codegen.ir.text import Body, Value
 from . import arithmetic
 from .arithmetic import Ends
 from .rounding import function_outwards, larger, smaller
@@ -137,9 +137,8 @@ def _circular(name: str, top: float) -> Callable[..., Ends]:
 
 def _tan(b: Body, x: Ends) -> Ends:
     low, high = function_outwards(b, *(applied(b, "tan", v) for v in x.values))
-    pole = _meets(b, x, 1 / math.pi, -0.5)
-    exists = b.logic("xor", pole, constant(True, pole.width, "b"))
-    exists = b.logic("and", exists, b.compare("ole", low, high))
+    without_pole = arithmetic.negated(b, _meets(b, x, 1 / math.pi, -0.5))
+    exists = b.logic("and", without_pole, b.compare("ole", low, high))
     return arithmetic.defined(b, exists, Ends(low=low, high=high))
 
 
@@ -212,7 +211,7 @@ def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
     low = b.select(positive, a.low, mirrored.low)
     high = b.select(negative, mirrored.high, a.high)
-    open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
+    open_ = arithmetic.negated(b, b.logic("or", positive, negative))
     return arithmetic.defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
 
 
@@ -224,8 +223,7 @@ def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
     ends = []
     for all_, at in zip(every.values, h.values, strict=True):
         ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
-    known = b.logic("or", b.logic("or", after, before), here)
-    jumps = b.logic("xor", known, constant(True, known.width, "b"))
+    jumps = arithmetic.negated(b, b.logic("or", b.logic("or", after, before), here))
     step = Ends(low=ends[0], high=ends[1])
     return arithmetic.defined(b, b.compare("ord", x.low, x.high), step), jumps
 

@@ -299,15 +299,10 @@ def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
 
 def _of_library_object(thing: object, seen: _Seen) -> Iterator[str]:
     """Yield text for an object of a library, and for all that it holds."""
-    if not seen.deep:
-        yield _constant(thing)
-    elif isinstance(thing, set | frozenset):
+    if seen.deep and isinstance(thing, set | frozenset):
         yield f"{type(thing).__name__} {sorted(_digest_of(_fingerprint(t, seen)) for t in thing)}"
-    else:
-        yield from _of_held(thing, held_by(thing, _is_library), seen)
-
-
-def _of_held(thing: object, held: object, seen: _Seen) -> Iterator[str]:
+        return
+    held = held_by(thing, _is_library) if seen.deep else None
     if held is None:
         yield _constant(thing)
     elif isinstance(held, str):
