@@ -23,7 +23,7 @@ import numpy as np
 
 from ...errors import UsageError
 from ...upstream.numba_internals import NumbaWarning, address_of
-from ..opaque.called import Call, Source
+from ..opaque.called import Call, Source, source_of
 from .fingerprint import function_key
 from .machine_code import Wanted, machine_code_if_taken
 
@@ -113,11 +113,11 @@ def _back(call: Call, lanes: int, raised: dict[Any, BaseException]) -> Callable[
 
 def _by_numba(call: Call, lanes: int) -> Any:
     """Return a call as compiled by numba, None if numba refuses it."""
-    if call.source is None:
-        return None
     try:
-        known = call.source()
+        known = source_of(call)
     except (UsageError, TypeError, ValueError):
+        return None
+    if known is None:
         return None
     source = Source(
         source="\n".join(["@equation", known.source, "", *_of_member(call, lanes), ""]),
