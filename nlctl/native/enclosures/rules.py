@@ -59,12 +59,12 @@ STEPS = ("floor", "ceil", "trunc", "rint", "sign")
 
 def interval_of(b: Body, name: str, *args: Ends) -> _Result:
     """Return what a function of the table makes of intervals, and where it may jump."""
-    if name in CHOICES:
-        return CHOICES[name](b, *args), None
+    if name in CHOICE_RULES:
+        return CHOICE_RULES[name](b, *args), None
     args = tuple(map(arithmetic.finite, args))
-    if name in SMOOTH:
-        return arithmetic.routine(b, name, SMOOTH[name], *args), None
-    return JUMPING[name](b, *args)
+    if name in SMOOTH_RULES:
+        return arithmetic.routine(b, name, SMOOTH_RULES[name], *args), None
+    return JUMP_RULES[name](b, *args)
 
 
 # -- functions of one argument ---------------------------------------------------------------------
@@ -234,7 +234,7 @@ def _logaddexp(b: Body, x: Ends, y: Ends) -> Ends:
     def at(v: Value, w: Value) -> Ends:
         one, other = Ends(low=v, high=v), Ends(low=w, high=w)
         apart = arithmetic.neg(b, arithmetic.absolute_of(b, arithmetic.sub(b, one, other)))
-        small = SMOOTH["log1p"](b, SMOOTH["exp"](b, apart))
+        small = SMOOTH_RULES["log1p"](b, SMOOTH_RULES["exp"](b, apart))
         return arithmetic.add(b, arithmetic.maximum(b, one, other), small)
 
     low, high = at(x.low, y.low).low, at(x.high, y.high).high
@@ -242,12 +242,12 @@ def _logaddexp(b: Body, x: Ends, y: Ends) -> Ends:
 
 
 # the first know an infinite constant, and the last may jump
-CHOICES: dict[str, Callable[..., Ends]] = {
+CHOICE_RULES: dict[str, Callable[..., Ends]] = {
     "absolute": arithmetic.absolute_of,
     "minimum": arithmetic.minimum,
     "maximum": arithmetic.maximum,
 }
-SMOOTH: dict[str, Callable[..., Ends]] = {
+SMOOTH_RULES: dict[str, Callable[..., Ends]] = {
     **{name: partial(_by_ends, name=name, known=known) for name, known in MONOTONE.items()},
     "sqrt": arithmetic.root_of,
     "cosh": _cosh,
@@ -258,7 +258,7 @@ SMOOTH: dict[str, Callable[..., Ends]] = {
     "power": _power,
     "logaddexp": _logaddexp,
 }
-JUMPING: dict[str, Callable[..., _Result]] = {
+JUMP_RULES: dict[str, Callable[..., _Result]] = {
     **{name: partial(_steps, name=name) for name in STEPS},
     "arctan2": _arctan2,
     "remainder": _rest("floor"),
