@@ -60,8 +60,7 @@ def discrete_loop() -> Any:
     """Return the loop that all diagrams share as machine code; without JIT unchanged."""
     options = {"error_model": "numpy", "nogil": True}
     wanted = Wanted(function=_iterate, signature=LOOP, options=options)
-    (loop,) = machine_code(function_key(_iterate), [wanted])
-    return loop
+    return machine_code(function_key(_iterate), wanted)
 
 
 def _iterate(rhs, out, times, inputs, c, states, outputs, g, m):

@@ -14,9 +14,9 @@ from ..annotations import as_annotated
 from ..arguments import number
 from ..attributes import with_parameters_of
 from ..diagrams import state_names
-from ..errors import OperatingPointError, ParameterError, UnknownKeywordError
-from ..names import find_name, unknown
-from ..responses.arguments import checked_params, state_array
+from ..errors import OperatingPointError, ParameterError
+from ..names import find_name
+from ..responses.arguments import checked_params, state_array, with_aliases
 from ..upstream.systems import System
 from ..wording import counted
 from .compiled import Compiled, as_compiled
@@ -191,7 +191,7 @@ def find_operating_point(
         "state_indices": state_indices, "deriv_indices": deriv_indices,
         "return_outputs": return_outputs,
     }  # fmt: skip
-    named = _with_short_names(named, aliases)
+    named = with_aliases(named, aliases, find_operating_point, _ALIASES)
     checked_params(params)
     cut = CutDiagram(_WHO, as_compiled(system, params), number(_WHO, "t", t), params)
     asked = _asked(cut, named)
@@ -258,16 +258,6 @@ def find_operating_points(
     return tuple(found)
 
 
-def _with_short_names(named: dict[str, Any], aliases: Mapping[str, Any]) -> dict[str, Any]:
-    """Return arguments by their full names."""
-    for name, value in aliases.items():
-        if name not in _ALIASES:
-            known = [*named, "root_method", *_ALIASES]
-            raise unknown("argument", name, known, f"of {_WHO}", UnknownKeywordError)
-        named[_ALIASES[name]] = value
-    return named
-
-
 def _asked(cut: CutDiagram, named: Mapping[str, Any]) -> _Asked:
     """Return what is free and what is fixed, as python-control has it."""
     system = cut.compiled.system
@@ -309,7 +299,7 @@ def _place(kind: str, each: object, names: Sequence[str]) -> int:
         raise ParameterError(f"{_WHO} needs places or names of each {kind}, got {each!r}")
     if not 0 <= each < len(names):
         raise ParameterError(
-            f"{_WHO} got {each} for the place of an {kind}: there are {len(names)}, from 0 on"
+            f"{_WHO} got {each} for a place of the {kind}s: there are {len(names)}, from 0 on"
         )
     return int(each)
 

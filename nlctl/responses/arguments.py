@@ -57,22 +57,25 @@ def checked_params(params: object) -> Mapping[str, Any] | None:
 
 
 def with_aliases(
-    given: Mapping[str, Any], aliases: Mapping[str, Any], function: Callable[..., Any]
+    given: Mapping[str, Any],
+    aliases: Mapping[str, Any],
+    function: Callable[..., Any],
+    short_names: Mapping[str, str] = ALIASES,
 ) -> dict[str, Any]:
     """Return arguments of a function by their full names."""
     found = dict(given)
     parameters = inspect.signature(function).parameters if aliases else {}
     for name, value in aliases.items():
-        full = ALIASES.get(name)
+        full = short_names.get(name)
         if full is None or full not in given:
-            short = [alias for alias, full in ALIASES.items() if full in given]
+            short = [alias for alias, full in short_names.items() if full in given]
             names = [*(k for k in parameters if k != "aliases"), *short]
             whose = f"of {function.__name__}"
             raise unknown("argument", name, names, whose, UnknownKeywordError)
         if given[full] is not parameters[full].default:
             raise ParameterError(f"'{full}' is given twice, as {full}= and as {name}=")
         found[full] = value
-    if found["timepts"] is None:
+    if found.get("timepts", 0.0) is None:
         raise ParameterError("timepts is missing: give the times of the response, in s")
     return found
 

@@ -31,7 +31,7 @@ from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
 from nlctl.native.machine import machine_code as machine_code_module
 from nlctl.native.machine.calls import loaded
-from nlctl.native.machine.fingerprint import function_key, module_key, program_key
+from nlctl.native.machine.fingerprint import function_key, module_key
 from nlctl.native.machine.machine_code import TEACHERS, Wanted, kept, machine_code
 from nlctl.native.opaque.called import Source
 
@@ -86,7 +86,7 @@ def code(key="cubed", function=cubed, **options):
     """A compiled function, and how many compilations it took."""
     wanted = Wanted(function=function, signature=REAL, options={"error_model": "numpy", **options})
     with event.install_recorder("numba:compile") as recorder:
-        (made,) = machine_code(key, [wanted])
+        made = machine_code(key, wanted)
     return made, sum(e.is_start for _, e in recorder.buffer)
 
 
@@ -258,9 +258,9 @@ class TestMachineCode:
         elif damage == "pickle":  # whole, but names what does not exist here
             store.write(file.stem, b"cmissing_module\nname\n.")
         elif damage == "library":  # whole, but no code that LLVM can read
-            ((library, *rest),) = pickle.loads(store.read(file.stem))
+            library, *rest = pickle.loads(store.read(file.stem))
             broken = (*library[:2], (library[2][0], b"no bitcode"))
-            store.write(file.stem, pickle.dumps([(broken, *rest)]))
+            store.write(file.stem, pickle.dumps((broken, *rest)))
         else:
             flipped = bytearray(content)
             flipped[len(content) // 2] ^= 1
@@ -277,7 +277,7 @@ class TestMachineCode:
         code()
         code(fastmath=True)
         wanted = Wanted(function=cubed, signature=numba.float32(numba.float32), options={})
-        machine_code("cubed", [wanted])
+        machine_code("cubed", wanted)
         assert len(list(folder.iterdir())) == 3
 
     def test_code_for_each_type_of_arguments(self, folder):
@@ -302,10 +302,11 @@ class TestMachineCode:
 
     def test_a_program_runs_from_its_own_source(self, folder):
         """Sources on disk are not looked at, and a traceback shows the line."""
-        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={})
+        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={"np": np})
         folder.mkdir(mode=0o700)
-        (folder / f"nlctl_program_{program_key(program)}.py").write_text("raise SystemExit")
-        module = loaded(program, {})
+        key = function_key(program.source, program.names)
+        (folder / f"nlctl_program_{key}.py").write_text("raise SystemExit")
+        module = loaded(program)
         assert module.__name__ in sys.modules
         with pytest.raises(TypeError) as caught:
             module.rhs(0.0)

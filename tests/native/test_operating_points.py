@@ -182,8 +182,14 @@ def test_wrong_questions_are_refused_by_name():
         nlctl.find_operating_point(pendulum(), 0.0, 0.0, state_indices=[0])
     with pytest.raises(nlctl.errors.UnknownNameError, match="angle"):
         nlctl.find_operating_point(pendulum(), 0.0, 0.0, 0.5, output_indices=["angel"])
+    with pytest.raises(nlctl.errors.ParameterError, match="got 2 for a place of the states: "):
+        nlctl.find_operating_point(pendulum(), 0.0, 0.0, state_indices=[2])
     with pytest.raises(nlctl.errors.ParameterError, match="root_method='no such'"):
         nlctl.find_operating_point(pendulum(), 0.0, 0.0, root_method="no such")
     hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="u", outputs="v", name="hold"))
     with pytest.raises(nlctl.errors.UsageError, match="'actuator'"):
         nlctl.find_operating_point(through(hold), 0.0, 1.0)
+    with pytest.raises(nlctl.errors.ParameterError, match="'inputs' is given twice, as inputs= "):
+        nlctl.find_operating_point(pendulum(), 0.0, 0.0, u0=1.0)
+    with pytest.raises(nlctl.errors.UnknownKeywordError, match="nearest: 'x0'"):
+        nlctl.find_operating_point(pendulum(), xO=1.0)

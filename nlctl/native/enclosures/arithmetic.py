@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..codegen.ir.functions import applied
 from ..codegen.ir.text import Body, Value, constant
-from .rounding import downwards, larger, product_downwards, product_upwards, smaller, upwards
+from .rounding import larger, outwards, product_outwards, smaller
 
 NAN = float("nan")
 
@@ -69,8 +69,8 @@ def truth(x: bool, width: int) -> Ends:
 
 def add(b: Body, x: Ends, y: Ends) -> Ends:
     x, y = finite(x), finite(y)
-    low = downwards(b, b.add(x.low, y.low, exact=True))
-    high = upwards(b, b.add(x.high, y.high, exact=True))
+    sums = (b.add(v, w, exact=True) for v, w in zip(x.values, y.values, strict=True))
+    low, high = outwards(b, *sums)
     return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
 
 
@@ -105,8 +105,7 @@ def mul(b: Body, x: Ends, y: Ends) -> Ends:
     if x.point == 0:
         zero = b.select(b.compare("uno", y.low, y.low), NAN, 0.0)
         return Ends(low=zero, high=zero, not_negative=True)
-    low, high = _ends_of_product(b, x, y)
-    low, high = product_downwards(b, low), product_upwards(b, high)
+    low, high = product_outwards(b, *_ends_of_product(b, x, y))
     if x.not_negative and y.not_negative:
         product = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
         return product if x.point is not None else defined(b, b.compare("ord", low, high), product)
@@ -151,8 +150,7 @@ def absolute_of(b: Body, x: Ends) -> Ends:
 
 def square_of(b: Body, x: Ends) -> Ends:
     a = absolute_of(b, x)
-    low = product_downwards(b, b.mul(a.low, a.low, exact=True))
-    high = product_upwards(b, b.mul(a.high, a.high, exact=True))
+    low, high = product_outwards(b, *(b.mul(v, v, exact=True) for v in a.values))
     return Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
 
 
@@ -167,8 +165,8 @@ def div(b: Body, x: Ends, y: Ends) -> Ends:
     )
     under = b.select(b.compare("oge", above[0], 0.0), below[1], below[0])
     over = b.select(b.compare("oge", above[1], 0.0), below[0], below[1])
-    low = product_downwards(b, b.op("fdiv", above[0], under, exact=True))
-    high = product_upwards(b, b.op("fdiv", above[1], over, exact=True))
+    quotients = (b.op("fdiv", v, w, exact=True) for v, w in ((above[0], under), (above[1], over)))
+    low, high = product_outwards(b, *quotients)
     signs = b.logic("and", b.compare("oge", above[0], 0.0), b.compare("olt", low, 0.0))
     low = b.select(signs, 0.0, low)
     exists = b.logic("and", b.logic("or", positive, negative), b.compare("ord", low, high))
@@ -182,8 +180,7 @@ def defined(b: Body, exists: Value, x: Ends) -> Ends:
 
 
 def root_of(b: Body, x: Ends) -> Ends:
-    low = downwards(b, b.intrinsic("sqrt", x.low))
-    high = upwards(b, b.intrinsic("sqrt", x.high))
+    low, high = outwards(b, *(b.intrinsic("sqrt", v) for v in x.values))
     low = b.select(b.compare("olt", low, 0.0), 0.0, low)
     root = Ends(low=low, high=high, not_negative=True)
     return defined(b, b.compare("oge", x.low, 0.0), root)
@@ -251,10 +248,10 @@ def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
 
 
 def logic_not(b: Body, x: Ends) -> Ends:
-    return Ends(low=_not(b, x.high), high=_not(b, x.low))
+    return Ends(low=negated(b, x.high), high=negated(b, x.low))
 
 
-def _not(b: Body, v: Value) -> Value:
+def negated(b: Body, v: Value) -> Value:
     return b.logic("xor", v, constant(True, v.width, "b"))
 
 
@@ -269,4 +266,4 @@ def logic(b: Body, op: str, x: Ends, y: Ends) -> Ends:
 
 def left_open(b: Body, condition: Ends) -> Value:
     """Return where a condition is open."""
-    return b.logic("and", condition.high, _not(b, condition.low))
+    return b.logic("and", condition.high, negated(b, condition.low))

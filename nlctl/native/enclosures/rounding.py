@@ -31,38 +31,29 @@ FUNCTION_ERROR = 2.0**-49
 FUNCTION_FLOOR = 2.0**-1068  # the same where the result is not normal
 
 
-def upwards(b: Body, s: Value) -> Value:
-    """Return an upper bound of what a sum or root was before it was rounded to s."""
-    s = b.select(b.compare("olt", s, -LARGEST_FLOAT), -LARGEST_FLOAT, s)
-    return b.fma(b.intrinsic("fabs", s), UNIT, s)
+def outwards(
+    b: Body, low: Value, high: Value, *, unit: float = UNIT, first: float = 0.0, last: float = 0.0
+) -> tuple[Value, Value]:
+    """Return bounds of what sums or roots were before they were rounded to these ends."""
+    # `first` and `last` are added as well, before a part `unit` of each end and behind it.
+    ends = []
+    for s, side, beyond in ((low, -1.0, "ogt"), (high, 1.0, "olt")):
+        moved = b.add(s, side * first, exact=True) if first else s
+        most = -side * LARGEST_FLOAT
+        moved = b.select(b.compare(beyond, moved, most), most, moved)
+        moved = b.fma(b.intrinsic("fabs", moved), side * unit, moved)
+        ends.append(b.add(moved, side * last, exact=True) if last else moved)
+    return ends[0], ends[1]
 
 
-def downwards(b: Body, s: Value) -> Value:
-    """Return a lower bound of what a sum or root was before it was rounded to s."""
-    s = b.select(b.compare("ogt", s, LARGEST_FLOAT), LARGEST_FLOAT, s)
-    return b.fma(b.intrinsic("fabs", s), -UNIT, s)
+def product_outwards(b: Body, low: Value, high: Value) -> tuple[Value, Value]:
+    """Return bounds of what products or quotients were before they were rounded to these ends."""
+    return outwards(b, low, high, first=TINY)
 
 
-def product_upwards(b: Body, s: Value) -> Value:
-    """Return an upper bound of what a product or quotient was before it was rounded to s."""
-    return upwards(b, b.add(s, TINY, exact=True))
-
-
-def product_downwards(b: Body, s: Value) -> Value:
-    """Return a lower bound of what a product or quotient was before it was rounded to s."""
-    return downwards(b, b.sub(s, TINY, exact=True))
-
-
-def function_upwards(b: Body, y: Value) -> Value:
-    """Return an upper bound of a function whose computed value is y."""
-    y = b.select(b.compare("olt", y, -LARGEST_FLOAT), -LARGEST_FLOAT, y)
-    return b.add(b.fma(b.intrinsic("fabs", y), FUNCTION_ERROR, y), FUNCTION_FLOOR, exact=True)
-
-
-def function_downwards(b: Body, y: Value) -> Value:
-    """Return a lower bound of a function whose computed value is y."""
-    y = b.select(b.compare("ogt", y, LARGEST_FLOAT), LARGEST_FLOAT, y)
-    return b.sub(b.fma(b.intrinsic("fabs", y), -FUNCTION_ERROR, y), FUNCTION_FLOOR, exact=True)
+def function_outwards(b: Body, low: Value, high: Value) -> tuple[Value, Value]:
+    """Return bounds of a function whose computed values are these ends."""
+    return outwards(b, low, high, unit=FUNCTION_ERROR, last=FUNCTION_FLOOR)
 
 
 def smaller(b: Body, x: Operand, y: Value) -> Value:

@@ -10,14 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from ..codegen.ir.functions import applied
-from ..codegen.ir.text import Body, Value, constant
+from ..codegen.ir.text import Body, Value
 from . import arithmetic
 from .arithmetic import Ends
-from .rounding import function_downwards, function_upwards, larger, smaller
+from .rounding import function_outwards, larger, smaller
 
-_Result = tuple[Ends, Value | None]
+_Result = tuple[Ends, Value | None]  # and where it may jump, if it may
 _INF = float("inf")
 _PI_UP = math.nextafter(math.pi, 4.0)
 
@@ -58,26 +59,20 @@ STEPS = ("floor", "ceil", "trunc", "rint", "sign")
 
 def interval_of(b: Body, name: str, *args: Ends) -> _Result:
     """Return what a function of the table makes of intervals, and where it may jump."""
-    if name in ("minimum", "maximum"):  # which know an infinite constant
-        return (arithmetic.minimum if name == "minimum" else arithmetic.maximum)(b, *args), None
+    if name in CHOICE_RULES:
+        return CHOICE_RULES[name](b, *args), None
     args = tuple(map(arithmetic.finite, args))
-    if name in MONOTONE:
-        known = MONOTONE[name]
-        return arithmetic.routine(b, name, lambda c, x: _by_ends(c, name, known, x), *args), None
-    if name in STEPS:
-        return _steps(b, name, args[0])
-    if name in _SMOOTH:
-        return arithmetic.routine(b, name, lambda c, *given: RULES[name](c, *given)[0], *args), None
-    return RULES[name](b, *args)
+    if name in SMOOTH_RULES:
+        return arithmetic.routine(b, name, SMOOTH_RULES[name], *args), None
+    return JUMP_RULES[name](b, *args)
 
 
 # -- functions of one argument ---------------------------------------------------------------------
 
 
-def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
+def _by_ends(b: Body, x: Ends, name: str, known: Monotone) -> Ends:
     first, last = x.values if known.rises else reversed(x.values)
-    low = function_downwards(b, applied(b, name, first))
-    high = function_upwards(b, applied(b, name, last))
+    low, high = function_outwards(b, *(applied(b, name, v) for v in (first, last)))
     if known.values[0] > -_INF:
         low = larger(b, known.values[0], low)
     if known.values[1] < _INF:
@@ -98,14 +93,14 @@ def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
     )
 
 
-def _steps(b: Body, name: str, x: Ends) -> _Result:
+def _steps(b: Body, x: Ends, name: str) -> _Result:
     low, high = (applied(b, name, v) for v in x.values)
     ends = Ends(low=low, high=high, not_negative=x.not_negative)
     return ends, b.compare("one", low, high)
 
 
-def _cosh(b: Body, x: Ends) -> _Result:
-    return _by_ends(b, "cosh", Monotone(values=(1.0, _INF)), arithmetic.absolute_of(b, x)), None
+def _cosh(b: Body, x: Ends) -> Ends:
+    return _by_ends(b, arithmetic.absolute_of(b, x), "cosh", Monotone(values=(1.0, _INF)))
 
 
 _TURN = 1 / (2 * math.pi)
@@ -125,40 +120,38 @@ def _meets(b: Body, x: Ends, per: float, shift: float) -> Value:
     return b.compare("oge", b.intrinsic("floor", high), low)
 
 
-def _circular(name: str, top: float) -> Callable[..., _Result]:
+def _circular(name: str, top: float) -> Callable[..., Ends]:
     """Return the rule of sine or cosine, whose maxima are `top` turns from 0."""
 
-    def rule(b: Body, x: Ends) -> _Result:
+    def rule(b: Body, x: Ends) -> Ends:
         first, last = (applied(b, name, v) for v in x.values)
-        low = larger(b, -1.0, function_downwards(b, smaller(b, first, last)))
-        high = smaller(b, 1.0, function_upwards(b, larger(b, first, last)))
+        low, high = function_outwards(b, smaller(b, first, last), larger(b, first, last))
+        low, high = larger(b, -1.0, low), smaller(b, 1.0, high)
         low = b.select(_meets(b, x, _TURN, 0.5 - top), -1.0, low)
         high = b.select(_meets(b, x, _TURN, -top), 1.0, high)
         is_number = b.logic("and", b.compare("ord", x.low, x.high), b.compare("ord", low, high))
-        return arithmetic.defined(b, is_number, Ends(low=low, high=high)), None
+        return arithmetic.defined(b, is_number, Ends(low=low, high=high))
 
     return rule
 
 
-def _tan(b: Body, x: Ends) -> _Result:
-    low = function_downwards(b, applied(b, "tan", x.low))
-    high = function_upwards(b, applied(b, "tan", x.high))
-    pole = _meets(b, x, 1 / math.pi, -0.5)
-    exists = b.logic("xor", pole, constant(True, pole.width, "b"))
-    exists = b.logic("and", exists, b.compare("ole", low, high))
-    return arithmetic.defined(b, exists, Ends(low=low, high=high)), None
+def _tan(b: Body, x: Ends) -> Ends:
+    low, high = function_outwards(b, *(applied(b, "tan", v) for v in x.values))
+    without_pole = arithmetic.negated(b, _meets(b, x, 1 / math.pi, -0.5))
+    exists = b.logic("and", without_pole, b.compare("ole", low, high))
+    return arithmetic.defined(b, exists, Ends(low=low, high=high))
 
 
 # -- functions of two arguments --------------------------------------------------------------------
 
 
-def _hypot(b: Body, x: Ends, y: Ends) -> _Result:
+def _hypot(b: Body, x: Ends, y: Ends) -> Ends:
     x, y = arithmetic.absolute_of(b, x), arithmetic.absolute_of(b, y)
-    low = function_downwards(b, applied(b, "hypot", x.low, y.low))
-    high = function_upwards(b, applied(b, "hypot", x.high, y.high))
+    ends = zip(x.values, y.values, strict=True)
+    low, high = function_outwards(b, *(applied(b, "hypot", v, w) for v, w in ends))
     is_number = b.logic("and", b.compare("ord", x.low, y.low), b.compare("ord", low, high))
     size = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
-    return arithmetic.defined(b, is_number, size), None
+    return arithmetic.defined(b, is_number, size)
 
 
 def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
@@ -171,17 +164,17 @@ def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
     for value in values[1:]:
         low, high = smaller(b, value, low), larger(b, value, high)
         numbers = b.logic("and", numbers, b.compare("ord", value, value))
-    bounds = Ends(low=function_downwards(b, low), high=function_upwards(b, high))
-    return arithmetic.defined(b, numbers, bounds)
+    low, high = function_outwards(b, low, high)
+    return arithmetic.defined(b, numbers, Ends(low=low, high=high))
 
 
-def _power(b: Body, x: Ends, y: Ends) -> _Result:
+def _power(b: Body, x: Ends, y: Ends) -> Ends:
     """x^y = e^(y ln x), which is largest and least at corners; it needs x >= 0."""
     at_zero = b.logic("and", b.compare("oge", x.low, 0.0), b.compare("ogt", y.low, 0.0))
     exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
     result = _corners(b, "power", x, y)
     result = Ends(low=larger(b, 0.0, result.low), high=result.high, not_negative=True)
-    return arithmetic.defined(b, exists, result), None
+    return arithmetic.defined(b, exists, result)
 
 
 def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
@@ -218,7 +211,7 @@ def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
     low = b.select(positive, a.low, mirrored.low)
     high = b.select(negative, mirrored.high, a.high)
-    open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
+    open_ = arithmetic.negated(b, b.logic("or", positive, negative))
     return arithmetic.defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
 
 
@@ -230,40 +223,46 @@ def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
     ends = []
     for all_, at in zip(every.values, h.values, strict=True):
         ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
-    known = b.logic("or", b.logic("or", after, before), here)
-    jumps = b.logic("xor", known, constant(True, known.width, "b"))
+    jumps = arithmetic.negated(b, b.logic("or", b.logic("or", after, before), here))
     step = Ends(low=ends[0], high=ends[1])
     return arithmetic.defined(b, b.compare("ord", x.low, x.high), step), jumps
 
 
-def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
+def _logaddexp(b: Body, x: Ends, y: Ends) -> Ends:
     """It rises with both: max(x, y) + ln(1 + e^-|x - y|) at the lower and at the upper ends."""
 
     def at(v: Value, w: Value) -> Ends:
         one, other = Ends(low=v, high=v), Ends(low=w, high=w)
         apart = arithmetic.neg(b, arithmetic.absolute_of(b, arithmetic.sub(b, one, other)))
-        small = _by_ends(b, "log1p", MONOTONE["log1p"], _by_ends(b, "exp", MONOTONE["exp"], apart))
+        small = SMOOTH_RULES["log1p"](b, SMOOTH_RULES["exp"](b, apart))
         return arithmetic.add(b, arithmetic.maximum(b, one, other), small)
 
     low, high = at(x.low, y.low).low, at(x.high, y.high).high
-    return arithmetic.defined(b, b.compare("ord", low, high), Ends(low=low, high=high)), None
+    return arithmetic.defined(b, b.compare("ord", low, high), Ends(low=low, high=high))
 
 
-RULES: dict[str, Callable[..., _Result]] = {
-    "absolute": lambda b, x: (arithmetic.absolute_of(b, x), None),
-    "sqrt": lambda b, x: (arithmetic.root_of(b, x), None),
+# the first know an infinite constant, and the last may jump
+CHOICE_RULES: dict[str, Callable[..., Ends]] = {
+    "absolute": arithmetic.absolute_of,
+    "minimum": arithmetic.minimum,
+    "maximum": arithmetic.maximum,
+}
+SMOOTH_RULES: dict[str, Callable[..., Ends]] = {
+    **{name: partial(_by_ends, name=name, known=known) for name, known in MONOTONE.items()},
+    "sqrt": arithmetic.root_of,
     "cosh": _cosh,
     "sin": _circular("sin", 0.25),
     "cos": _circular("cos", 0.0),
     "tan": _tan,
     "hypot": _hypot,
     "power": _power,
+    "logaddexp": _logaddexp,
+}
+JUMP_RULES: dict[str, Callable[..., _Result]] = {
+    **{name: partial(_steps, name=name) for name in STEPS},
     "arctan2": _arctan2,
     "remainder": _rest("floor"),
     "fmod": _rest("trunc"),
     "copysign": _copysign,
     "heaviside": _heaviside,
-    "logaddexp": _logaddexp,
 }
-# those that never jump
-_SMOOTH = ("sqrt", "cosh", "sin", "cos", "tan", "hypot", "power", "logaddexp")

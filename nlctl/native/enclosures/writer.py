@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ...expressions.continuity import is_an_extreme
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
 from ..codegen.ir.numbers import one_line
-from ..codegen.ir.text import Body, Module, Value
+from ..codegen.ir.text import Body, Module, Value, pointers
 from . import arithmetic
 from .arithmetic import Ends
 from .rounding import larger, smaller
@@ -139,19 +139,13 @@ class EnclosureWriter:
         return jump
 
 
-def _function(b: Body, name: str, *arguments: str) -> str:
-    given = ", ".join(f"ptr noalias %{argument}" for argument in arguments)
-    return f"define void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"
-
-
 def _values(module: Module, results: Sequence[Expr]) -> str:
     b = Body(module)
     w = EnclosureWriter(b)
     w.write(results)
     for k, expr in enumerate(results):
         w.keep("v", 2 * k, *arithmetic.finite(w.names[expr]).values)
-    b.write("ret void")
-    return _function(b, "values", "x", "v")
+    return b.function("values", pointers("xv"))
 
 
 def _judge(
@@ -171,8 +165,7 @@ def _judge(
         at_centre.append(value)
         bounds.append(_bound(w, expr, value, slopes[k], steps))
     _kept(w, rows, bounds, at_centre, [_weights(b, box, slope) for slope in slopes])
-    b.write("ret void")
-    return _function(b, "judge", "x", "o")
+    return b.function("judge", pointers("xo"))
 
 
 _Step = tuple[Ends, Value]

@@ -23,8 +23,8 @@ import numpy as np
 
 from ...errors import UsageError
 from ...upstream.numba_internals import NumbaWarning, address_of
-from ..opaque.called import Call, Source
-from .fingerprint import Sourced, program_key
+from ..opaque.called import Call, Source, source_of
+from .fingerprint import function_key
 from .machine_code import Wanted, machine_code_if_taken
 
 _ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
@@ -113,17 +113,17 @@ def _back(call: Call, lanes: int, raised: dict[Any, BaseException]) -> Callable[
 
 def _by_numba(call: Call, lanes: int) -> Any:
     """Return a call as compiled by numba, None if numba refuses it."""
-    if call.source is None:
-        return None
     try:
-        known = call.source()
+        known = source_of(call)
     except (UsageError, TypeError, ValueError):
+        return None
+    if known is None:
         return None
     source = Source(
         source="\n".join(["@equation", known.source, "", *_of_member(call, lanes), ""]),
         names=known.names,
     )
-    module = loaded(source, {})
+    module = loaded(source)
     request = Wanted(
         function=getattr(module, f"at_{call.name}"), signature=_ADDRESS, options=OPTIONS
     )
@@ -156,17 +156,17 @@ def at_{call.name}(c, at, lane):
         table[at + {given} + i, lane] = y[i]""".splitlines()
 
 
-def loaded(program: Sourced, functions: Mapping[str, Any]) -> types.ModuleType:
+def loaded(program: Source) -> types.ModuleType:
     """Return the program as a module, made of its own source."""
     # It is registered under the program's key, by which machine code that was kept finds it, and
     # its lines are known to tracebacks.
-    name = f"nlctl_program_{program_key(program)}"
+    name = f"nlctl_program_{function_key(program.source, program.names)}"
     file = f"<{name}>"
     lines = program.source.splitlines(keepends=True)
     linecache.cache[file] = (len(program.source), None, lines, file)
     module = types.ModuleType(name)
     module.__file__ = file
-    module.__dict__.update(program.namespace(native=True) | dict(functions))
+    module.__dict__.update(program.names)
     exec(compile(program.source, file, "exec"), module.__dict__)
     sys.modules[name] = module  # machine code looks its globals up there
     return module

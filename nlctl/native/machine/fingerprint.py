@@ -20,14 +20,14 @@ import types
 from collections.abc import Iterable, Iterator
 from numbers import Number
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numba
 import numpy as np
 
 from ...annotations import unreported
 from ...expressions.source import codes_in
-from ..purity.captured import in_cell
+from ..purity.captured import attributes_of, in_cell
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
 
@@ -70,21 +70,6 @@ class _Seen(dict[int, Any]):
             return False
         self[id(thing)] = thing
         return True
-
-
-class Sourced(Protocol):
-    """Emitted source, and what it refers to: a `Program`, or one that was lowered."""
-
-    @property
-    def source(self) -> str: ...
-
-    def namespace(self, *, native: bool) -> dict[str, Any]: ...
-
-
-def program_key(program: Sourced) -> str:
-    """Return a key of a program's source and of everything that it refers to."""
-    parts = program.namespace(native=True)
-    return function_key(program.source, *(x for name in sorted(parts) for x in (name, parts[name])))
 
 
 def function_key(*things: object) -> str:
@@ -300,8 +285,7 @@ def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
     if not seen.add(thing):
         return
     yield from _of_class(type(thing), seen)
-    held = {name: getattr(thing, name) for name in _slots(type(thing)) if hasattr(thing, name)}
-    for name, value in sorted({**held, **getattr(thing, "__dict__", {})}.items()):
+    for name, value in sorted(attributes_of(thing).items()):
         if not (seen.deep and name in LAID_OUT):
             yield name
             yield from _fingerprint(value, seen)
@@ -313,26 +297,12 @@ def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
         yield from (held,) if isinstance(held, str) else _fingerprint(held, seen)
 
 
-def _slots(kind: type) -> Iterator[str]:
-    """Yield the names of slots as attributes have them."""
-    for base in kind.__mro__:
-        given = base.__dict__.get("__slots__", ())
-        for name in (given,) if isinstance(given, str) else given:
-            is_private = name.startswith("__") and not name.endswith("__")
-            yield f"_{base.__name__.lstrip('_')}{name}" if is_private else name
-
-
 def _of_library_object(thing: object, seen: _Seen) -> Iterator[str]:
     """Yield text for an object of a library, and for all that it holds."""
-    if not seen.deep:
-        yield _constant(thing)
-    elif isinstance(thing, set | frozenset):
+    if seen.deep and isinstance(thing, set | frozenset):
         yield f"{type(thing).__name__} {sorted(_digest_of(_fingerprint(t, seen)) for t in thing)}"
-    else:
-        yield from _of_held(thing, held_by(thing, _is_library), seen)
-
-
-def _of_held(thing: object, held: object, seen: _Seen) -> Iterator[str]:
+        return
+    held = held_by(thing, _is_library) if seen.deep else None
     if held is None:
         yield _constant(thing)
     elif isinstance(held, str):

@@ -11,7 +11,7 @@ import hashlib
 import pickle
 import platform
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +26,6 @@ from ...upstream.numba_internals import (
     CodeCache,
     NumbaError,
     give_cache,
-    global_compiler_lock,
     is_jit_disabled,
     processor,
     settings,
@@ -47,19 +46,17 @@ class Wanted:
     options: Mapping[str, Any]  # of `numba.njit`
 
 
-def machine_code(key: str, requests: Sequence[Wanted]) -> list[Any]:
-    """Return functions as machine code, from the store, or compiled and kept there as one entry."""
-    # With NUMBA_DISABLE_JIT=1 they are returned unchanged.
+def machine_code(key: str, request: Wanted) -> Any:
+    """Return a function as machine code, from the store, or compiled and kept there."""
+    # With NUMBA_DISABLE_JIT=1 it is returned unchanged.
     if is_jit_disabled():
-        return [request.function for request in requests]
-    key = store_key(key, *((str(request.signature), request.options) for request in requests))
-    with global_compiler_lock:  # types are made, as by a compilation
-        known = _read(key)
-    caches = [_Given(data) for data in known or [None] * len(requests)]
-    functions = [_compiled(*pair) for pair in zip(requests, caches, strict=True)]
-    if any(cache.is_new for cache in caches):
-        _write(key, [cache.data for cache in caches])
-    return functions
+        return request.function
+    place = store_key(key, str(request.signature), request.options)
+    code: Any = numba.njit(**request.options)(request.function)
+    give_cache(code, _Stored(lambda signature: place))
+    code.compile(request.signature)
+    code.disable_compile()
+    return code
 
 
 def machine_code_if_taken(key: str, request: Wanted) -> Any:
@@ -68,20 +65,12 @@ def machine_code_if_taken(key: str, request: Wanted) -> Any:
     if store.read(refused) is not None:
         return None
     try:
-        return machine_code(key, [request])[0]
+        return machine_code(key, request)
     except NumbaError:
         store.write(refused, b"refused")
     except Exception:  # numba passes on whatever typing raises
         pass
     return None
-
-
-def _compiled(request: Wanted, cache: CodeCache) -> Any:
-    code: Any = numba.njit(**request.options)(request.function)
-    give_cache(code, cache)
-    code.compile(request.signature)
-    code.disable_compile()
-    return code
 
 
 def kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -90,41 +79,23 @@ def kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
         code: Any = numba.njit(**options)(function)
         if not is_jit_disabled():
-            give_cache(code, _ByArguments(code))
+            give_cache(code, _Stored(lambda types: store_key(function_key(code), str(types))))
         return code
 
     return decorate
 
 
-class _Given(CodeCache):
-    """Gives numba the code of one function, or takes it."""
+class _Stored(CodeCache):
+    """Gives numba the code of a function from the store, by the key of a signature, or takes it."""
 
-    def __init__(self, data: object) -> None:
-        self.data, self.is_new = data, False
-
-    def load(self, signature: object) -> Any:
-        return self.data
-
-    def save(self, signature: object, data: object) -> None:
-        self.data, self.is_new = data, True
-
-
-class _ByArguments(CodeCache):
-    """Gives numba the code of a function for given types of arguments, or takes it."""
-
-    def __init__(self, code: object) -> None:
-        self.code = code
-
-    @functools.cached_property
-    def key(self) -> str:
-        return function_key(self.code)
+    def __init__(self, key: Callable[[object], str]) -> None:
+        self.key = key
 
     def load(self, signature: object) -> Any:
-        known = _read(store_key(self.key, str(signature)))
-        return None if known is None else known[0]
+        return _read(self.key(signature))
 
     def save(self, signature: object, data: object) -> None:
-        _write(store_key(self.key, str(signature)), [data])
+        _write(self.key(signature), data)
 
 
 def store_key(key: str, *more: object) -> str:
@@ -142,7 +113,7 @@ def _compiler() -> tuple[str, ...]:
     return (*versions, module_key(*TEACHERS))
 
 
-def _write(key: str, data: list[Any]) -> None:
+def _write(key: str, data: object) -> None:
     try:
         body = cloudpickle.dumps(data)
     except Exception:  # a constant that is an object of this process: costs time and nothing else
@@ -150,7 +121,7 @@ def _write(key: str, data: list[Any]) -> None:
     store.write(key, body)
 
 
-def _read(key: str) -> list[Any] | None:
+def _read(key: str) -> Any:
     body = store.read(key)
     if body is None:
         return None

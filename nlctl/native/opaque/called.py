@@ -7,9 +7,9 @@ argument that the function takes apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from types import FunctionType
 from typing import Any
@@ -45,30 +45,28 @@ class Source:
     source: str
     names: Mapping[str, Any]
 
-    def namespace(self, *, native: bool) -> dict[str, Any]:
-        """Return everything that the source refers to, by name."""
-        return {"np": np, "carray": carray, "equation": equation, **self.names}
-
 
 @dataclass(frozen=True, kw_only=True)
 class Call:
-    """A function that is called for one member at a time."""
+    """Functions of a block that are called for one member at a time."""
 
     name: str
-    # whose function it is, and which one
+    # whose functions they are, and which ones
     block: str
     kind: str
+    functions: tuple[Any, ...]
     lengths: tuple[int, ...]  # sizes of t, x, u, p and y
-    reason: str  # why it could not be traced
-    # it in Python: takes t, x, u and p in one array, returns y
-    function: Callable[[np.ndarray], np.ndarray]
-    # makes the `Source` of ``name(given, y)`` for numba; None where numba would understand it in
-    # another way
-    source: Callable[[], Source] | None
+    reason: str  # why they could not be traced
+    # the block's parameters, where those that are numbers lie, and the record that has them
+    template: Mapping[str, Any]
+    slots: Mapping[str, Slot]
+    record: type | None
+    # what numba takes arguments for; None where it would understand the functions in another way
+    system: System | None
 
     @property
     def why(self) -> str:
-        """Why it could not be traced, and what to do about that."""
+        """Why they could not be traced, and what to do about that."""
         return f"{self.reason}; {remedy_of(self.reason)}"
 
     @property
@@ -86,57 +84,17 @@ class Call:
         """Rows that it takes: arguments, results, whether it has failed, and with what."""
         return self.failed + 1 + self.given
 
-    def of_column(self, column: np.ndarray) -> None:
-        """Read its arguments from its rows for one member, and write its results there."""
-        column[self.given : self.failed] = self.function(column[: self.given].copy())
-
-
-def call_of(
-    name: str, node: Node, kind: str, functions: Sequence[Any], slots: Mapping[str, Slot],
-    count: int, reason: str,
-) -> Call:  # fmt: skip
-    """Return a call of a block's functions."""
-    size = sum(s.size for s in slots.values())
-    stands = _AsItStands(
-        path=node.path,
-        kind=kind,
-        functions=tuple(functions),
-        template=dict(current_values(node.system)),
-        slots=slots,
-        record=type(current_parameters(node.system)) if isinstance(node.system, Block) else None,
-        lengths=(1, node.system.nstates or 0, len(node.inputs), size, count),
-    )
-    reason = "; ".join([reason, *(f"it {m.reason} ({m.place})" for m in node.messages)])
-    # a name without a value is an error in Python, and 0 in numba's machine code
-    # and a message of Python's is written by Python
-    source = (
-        None if node.numba_differs or node.messages else partial(_source, name, stands, node.system)
-    )
-    return Call(
-        name=name, block=node.path, kind=kind, lengths=stands.lengths, reason=reason,
-        function=stands, source=source,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class _AsItStands:
-    """A block's functions of one flat array: t, x, u and parameters, one after the other."""
-
-    path: str
-    kind: str
-    functions: tuple[Any, ...]
-    template: Mapping[str, Any]
-    slots: Mapping[str, Slot]
-    record: type | None
-    lengths: tuple[int, ...]
-
     @cached_property
     def start(self) -> int:
         """Where the parameters begin in the program's vector."""
         return min((s.offset for s in self.slots.values()), default=0)
 
-    def __call__(self, given: np.ndarray) -> np.ndarray:
-        """Return the results."""
+    def of_column(self, column: np.ndarray) -> None:
+        """Read its arguments from its rows for one member, and write its results there."""
+        column[self.given : self.failed] = self.function(column[: self.given].copy())
+
+    def function(self, given: np.ndarray) -> np.ndarray:
+        """Return the results in Python, of t, x, u and parameters one after the other."""
         _, x, u, p, count = self.lengths
         places = np.cumsum((1, x, u, p))
         parts = [given[a:b].copy() for a, b in pairwise(places)]
@@ -147,8 +105,8 @@ class _AsItStands:
         values = np.concatenate([np.empty(0), *results])
         if values.size != count:
             raise BlockError(
-                f"block '{self.path}' returns {counted(values.size, 'value')} from its {self.kind} "
-                f"function, needs {count}"
+                f"block '{self.block}' returns {counted(values.size, 'value')} from its "
+                f"{self.kind} function, needs {count}"
             )
         return values
 
@@ -157,7 +115,7 @@ class _AsItStands:
         array = np.asarray(values).reshape(-1)
         if array.dtype.kind not in "biufc":
             raise BlockError(
-                f"block '{self.path}' returns {str(values)[:60]!r} from its {self.kind} function, "
+                f"block '{self.block}' returns {str(values)[:60]!r} from its {self.kind} function, "
                 "needs numbers"
             )
         return array
@@ -171,6 +129,25 @@ class _AsItStands:
             for name, value in self.template.items()
         }
         return values if self.record is None else self.record(**values)
+
+
+def call_of(
+    name: str, node: Node, kind: str, functions: Sequence[Any], slots: Mapping[str, Slot],
+    count: int, reason: str,
+) -> Call:  # fmt: skip
+    """Return a call of a block's functions."""
+    size, system = sum(s.size for s in slots.values()), node.system
+    # a name without a value is an error in Python, and 0 in numba's machine code
+    # and a message of Python's is written by Python
+    in_python = node.numba_differs or node.messages
+    return Call(
+        name=name, block=node.path, kind=kind, functions=tuple(functions),
+        lengths=(1, system.nstates or 0, len(node.inputs), size, count),
+        reason="; ".join([reason, *(f"it {m.reason} ({m.place})" for m in node.messages)]),
+        template=dict(current_values(system)), slots=slots,
+        record=type(current_parameters(system)) if isinstance(system, Block) else None,
+        system=None if in_python else system,
+    )  # fmt: skip
 
 
 def _like(template: Any, values: np.ndarray) -> Any:
@@ -191,46 +168,49 @@ def _like(template: Any, values: np.ndarray) -> Any:
 # -- numba -----------------------------------------------------------------------------------------
 
 
-def _source(name: str, stands: _AsItStands, system: System) -> Source:
-    """Return the source of ``name(given, y)`` for numba."""
-    _, x, u, p, count = stands.lengths
+def source_of(call: Call) -> Source | None:
+    """Return the source of ``name(given, y)`` for numba; None where it is for Python alone."""
+    if (system := call.system) is None:
+        return None
+    _, x, u, p, count = call.lengths
     first, second, third = 1, 1 + x, 1 + x + u
-    fixed = [k for k in stands.template if k not in stands.slots]
+    fixed = [k for k in call.template if k not in call.slots]
     values = [
-        stands.slots[k].moved(-stands.start).expression if k in stands.slots else
-        f"fixed{fixed.index(k)}" for k in stands.template
+        call.slots[k].moved(-call.start).expression if k in call.slots else
+        f"fixed{fixed.index(k)}" for k in call.template
     ]  # fmt: skip
     is_block = isinstance(system, Block)
-    record = stands.record or params_record(stands.path, list(stands.template))
+    record = call.record or params_record(call.block, list(call.template))
     filler = [] if values or is_block else ["0.0"]
     of_parameters = f"record({', '.join(values or filler)})"
     lines = [
-        f"def {name}(given, y):",
+        f"def {call.name}(given, y):",
         f"    t, p = given[0], given[{third}:{third + p}]",
         f"    params = {of_parameters if is_block else f'read_by_keys({of_parameters})'}",
     ]
-    counts = _counts(stands, count)
+    counts = _counts(call, count)
     at = 0
-    for k, function in enumerate(stands.functions):
+    for k, function in enumerate(call.functions):
         tuples = _as_tuples(system, function)
         given = [_given(first, x, 1 in tuples), _given(second, u, 2 in tuples)]
-        call = f"function{k}(t, {', '.join(given)}, params)"
-        lines += [f"    values = as_vector({call}, {counts[k]})"]
+        result = f"function{k}(t, {', '.join(given)}, params)"
+        lines += [f"    values = as_vector({result}, {counts[k]})"]
         lines += [f"    y[{at + j}] = values[{j}]" for j in range(counts[k])]
         at += counts[k]
-    names = {"record": record, "as_vector": as_vector, "read_by_keys": read_by_keys}
-    names |= {f"fixed{i}": callable_constant(stands.template[k]) for i, k in enumerate(fixed)}
-    names |= {f"function{k}": _jitted(frozen(f)) for k, f in enumerate(stands.functions)}
+    names = {"np": np, "carray": carray, "equation": equation, "record": record}
+    names |= {"as_vector": as_vector, "read_by_keys": read_by_keys}
+    names |= {f"fixed{i}": callable_constant(call.template[k]) for i, k in enumerate(fixed)}
+    names |= {f"function{k}": _jitted(frozen(f)) for k, f in enumerate(call.functions)}
     return Source(source="\n".join([*lines, ""]), names=names)
 
 
-def _counts(stands: _AsItStands, count: int) -> list[int]:
+def _counts(call: Call, count: int) -> list[int]:
     """Return how many results each function has; of several it is found by calling them."""
-    if len(stands.functions) == 1:
+    if len(call.functions) == 1:
         return [count]
-    x, u = np.zeros(stands.lengths[1]), np.full(stands.lengths[2], 0.25)
-    params = stands.record(**stands.template) if stands.record else dict(stands.template)
-    return [int(np.size(f(0.0, x, u, params))) for f in stands.functions]
+    x, u = np.zeros(call.lengths[1]), np.full(call.lengths[2], 0.25)
+    params = call.record(**call.template) if call.record else dict(call.template)
+    return [int(np.size(f(0.0, x, u, params))) for f in call.functions]
 
 
 def _as_tuples(system: System, function: object) -> set[int]:

@@ -160,10 +160,23 @@ class _Content:
 
 def _content(value: Any) -> dict[str, Any]:
     """Return the numbers and containers that an object of a library holds."""
-    slots = [name for cls in type(value).__mro__ for name in getattr(cls, "__slots__", ())]
-    held = {name: getattr(value, name) for name in slots if hasattr(value, name)}
-    held |= getattr(value, "__dict__", {})
-    return {k: v for k, v in held.items() if isinstance(v, (np.ndarray, tuple, list, *PLAIN))}
+    plain = np.ndarray, tuple, list, *PLAIN
+    return {k: v for k, v in attributes_of(value).items() if isinstance(v, plain)}
+
+
+def attributes_of(thing: object) -> dict[str, Any]:
+    """Return the attributes that an object has itself, those in slots among them."""
+    held = {name: getattr(thing, name) for name in _slots(type(thing)) if hasattr(thing, name)}
+    return {**held, **getattr(thing, "__dict__", {})}
+
+
+def _slots(kind: type) -> Iterator[str]:
+    """Yield the names of slots as attributes have them."""
+    for base in kind.__mro__:
+        given = base.__dict__.get("__slots__", ())
+        for name in (given,) if isinstance(given, str) else given:
+            is_private = name.startswith("__") and not name.endswith("__")
+            yield f"_{base.__name__.lstrip('_')}{name}" if is_private else name
 
 
 def same(now: Any, then: Any) -> bool:

@@ -455,7 +455,7 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     missing = object()
     member = inspect.getattr_static(thing, name, missing)
     if member is missing:
-        return not any(hasattr(type(thing), special) for special in ("__getattr__",))
+        return not hasattr(type(thing), "__getattr__")
     simple = (FunctionType, staticmethod, classmethod)
     return (
         isinstance(member, simple)

@@ -80,6 +80,9 @@ class Given:
         """All of them."""
         return (*self.places, *self.names.values())
 
+    def __hash__(self) -> int:
+        return hash((self.every, *self.names))
+
     def __add__(self, more: Given) -> Given:
         return Given(self.places + more.places, {**self.names, **more.names})
 
@@ -113,6 +116,9 @@ class Instance:
     def __init__(self, cls: type) -> None:
         self.cls, self.version = cls, 0  # how often something new was learnt
         self.attributes: dict[str, KnownValue] = {}  # what is known of each, whenever written
+
+    def __hash__(self) -> int:  # what has been computed with it counts until it learns more
+        return hash((id(self), self.version))
 
     def learn(self, name: str, value: KnownValue) -> None:
         """Note that an attribute is written."""
@@ -155,27 +161,9 @@ class KnownValue:
     @property
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
-        return self.own, self.inside, self.holds, _marks(self.known)
-
-
-def _marks(known: object) -> Any:
-    """Return what distinguishes one object that is known from another."""
-    if isinstance(known, OneOf | ListOf):
-        return type(known).__name__, frozenset(choice.marks for choice in known.choices)
-    if isinstance(known, RowOf):
-        return "row", tuple(part.marks for part in known.parts)
-    if isinstance(known, Local):
-        return "local", id(known.node), id(known.frame)
-    if isinstance(known, Bound):
-        given = tuple(v.marks for v in known.given.every)
-        return "bound", known.function.marks, given, tuple(known.given.names)
-    if isinstance(known, Cached):
-        return "cached", known.function.marks
-    if isinstance(known, Instance):
-        return "instance", id(known), known.version
-    if isinstance(known, Parent):
-        return "parent", known.own.marks, known.cls
-    return ("pure", known.gives_parts) if isinstance(known, Pure) else id(known)
+        kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
+        known = self.known if isinstance(self.known, kinds) else id(self.known)
+        return self.own, self.inside, self.holds, known
 
 
 FRESH = KnownValue(True, True)

@@ -60,21 +60,20 @@ class Shaken(np.ndarray):
     ) -> Any:
         return self._rounded(function(*_plain(args), **_plain(kwargs)))
 
-    def _rounded(self, value: object) -> Any:
+    def _rounded(self, value: Any) -> Any:
         """Return a result with other last digits; anything else as it is."""
-        if isinstance(value, tuple | list):
-            return type(value)(map(self._rounded, value)) if type(value) in (tuple, list) else value
-        if not (isinstance(value, np.ndarray | np.floating) and value.dtype == float):
-            return value
-        if self.drawn is None:
-            return self._like(value)
-        ways = self.drawn.choice((-1.0, 1.0), size=np.shape(value))
-        return self._like(value * (1.0 + unit() * ways))
+        if type(value) in (tuple, list):
+            return type(value)(map(self._rounded, value))
+        if self.drawn is not None and _is_of_floats(value):
+            value = value * (1.0 + unit() * self.drawn.choice((-1.0, 1.0), size=np.shape(value)))
+        return self._like(value)
 
     def _like(self, values: object) -> Any:
-        if not (isinstance(values, np.ndarray | np.floating) and values.dtype == float):
-            return values
-        return Shaken.of(values, self.drawn)
+        return Shaken.of(values, self.drawn) if _is_of_floats(values) else values
+
+
+def _is_of_floats(value: object) -> bool:
+    return isinstance(value, np.ndarray | np.floating) and value.dtype == float
 
 
 def _plain(argument: Any) -> Any:

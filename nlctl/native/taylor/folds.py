@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..codegen.ir.text import Body, Module, Turns, Value, constant
+from ..codegen.ir.text import Body, Module, Turns, Value, constant, pointers
 from .recurrences import IS_FIRST_ROW, ORDER_ROW, RECIPROCAL_ROW, ROOM, Fold
 
 WIDE = ROOM  # consecutive rows of a single member that are read together
@@ -69,9 +69,7 @@ def _orders_text(layout: SeriesLayout) -> str:
     _write_weights(b, place["w"], highest, lanes)
     before, here = _orders_at(b, highest, size)
     b.write(f"call void @last(ptr {place['w']}, ptr {before}, ptr {here})")
-    b.write("ret void")
-    arguments = ", ".join(f"ptr %{a}" for a in ("t", "x", "u", "v", "c", "k"))
-    return f"define void @taylor({arguments}) nounwind {{\nentry:\n{b.text()}}}\n"
+    return b.function("taylor", ", ".join(f"ptr %{a}" for a in "txuvck"))
 
 
 def _orders_at(b: Body, order: str, size: int) -> tuple[str, str]:
@@ -105,11 +103,8 @@ def _sums_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
     b.write("%any = icmp sgt i64 %order, 1")
     for begin in range(0, len(sums), _AT_ONCE):
         _chunk(b, sums[begin : begin + _AT_ONCE], lanes, size)
-    b.write("ret void")
-    return (
-        "define internal void @sums(ptr noalias %k, i64 %order, ptr noalias %a, ptr noalias %q) "
-        f"nounwind {{\nentry:\n{b.text()}}}\n"
-    )
+    given = f"{pointers('k')}, i64 %order, {pointers('aq')}"
+    return b.function("sums", given, "internal ")
 
 
 def _vectors(fold: Fold, lanes: int) -> list[_Sum]:

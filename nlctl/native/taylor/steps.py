@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ..codegen.ir.functions import applied
-from ..codegen.ir.text import Body, Module, Turns, Value, constant
+from ..codegen.ir.text import Body, Module, Turns, Value, constant, pointers
 from ..integrate.methods.crossings import FOLLOWED
 from .folds import WIDE, SeriesLayout
 
@@ -36,9 +36,7 @@ def steps_text(n: int, switching: int, compared: Sequence[int], layout: SeriesLa
     for name, (arguments, write) in functions.items():
         function = _Function(layout)
         write(function)
-        function.b.write("ret void")
-        given = ", ".join(f"ptr noalias %{a}" for a in arguments.split())
-        texts.append(f"define void @{name}({given}) nounwind {{\nentry:\n{function.b.text()}}}\n")
+        texts.append(function.b.function(name, pointers(arguments.split())))
     return "\n".join(texts)
 
 

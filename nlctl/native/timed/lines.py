@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -139,7 +138,7 @@ def _sum(a: Lines, b: Lines, factor: float) -> Lines:
     return replace(a, values=a.values + factor * b.values, slopes=a.slopes + factor * b.slopes)
 
 
-def _scaled(a: Lines, by: np.ndarray) -> Lines:
+def _scaled(a: Lines, by: np.ndarray | float) -> Lines:
     return replace(a, values=a.values * by, slopes=a.slopes * by)
 
 
@@ -156,7 +155,7 @@ def _combined(node: Expr, found: Mapping[Expr, Lines]) -> Lines:
     if node.op in ("add", "sub"):
         return _sum(args[0], args[1], 1.0 if node.op == "add" else -1.0)
     if node.op == "neg":
-        return _scaled(args[0], np.full(args[0].starts.size, -1.0))
+        return _scaled(args[0], -1.0)
     if node.op == "div":
         return _divide(*args)
     if node.op == "mul":
@@ -190,12 +189,12 @@ def _constant(op: str, parts: list[Lines], middle: list[np.ndarray], half: objec
     return replace(parts[0], values=values, slopes=np.zeros(values.size))
 
 
-def _chosen(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) -> Lines:
+def _chosen(op: str, parts: list[Lines], middle: list[np.ndarray], half: object) -> Lines:
     """Return one of the arguments on each piece, or its negative."""
     if op == "select":
         first, a, b = middle[0] != 0, parts[1], parts[2]
     elif op == "absolute":
-        first, a, b = middle[0] >= 0, parts[0], _scaled(parts[0], np.full(half.size, -1.0))
+        first, a, b = middle[0] >= 0, parts[0], _scaled(parts[0], -1.0)
     else:
         less = middle[0] < middle[1]
         first, (a, b) = (less if op == "minimum" else ~less), parts

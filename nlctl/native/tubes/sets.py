@@ -50,10 +50,9 @@ def sizes(P, degrees, by_degree, whole):
 def next_polynomials(J, H, P, table, error):
     """Carry polynomials on, in place, and add what that leaves out to errors."""
     # Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
-    degrees, _, products, _ = table
-    n, degree = P.shape[0], degrees.max()
+    n, degree = P.shape[0], table.degrees.max()
     by_degree, whole = np.zeros((n, degree + 1)), np.zeros(n)
-    sizes(P, degrees, by_degree, whole)
+    sizes(P, table.degrees, by_degree, whole)
     carried, left = np.zeros_like(P), np.zeros(n)
     for k in range(n):
         for i in range(n):
@@ -65,7 +64,9 @@ def next_polynomials(J, H, P, table, error):
     square = np.empty(P.shape[1])
     for i in range(n):
         for j in range(i + 1):
-            beyond = polynomial_product(P[i], P[j], products, by_degree[i], by_degree[j], square)
+            beyond = polynomial_product(
+                P[i], P[j], table.products, by_degree[i], by_degree[j], square
+            )
             all_of_it, part = whole[i] * whole[j], 0.5 if i == j else 1.0
             for k in range(n):
                 middle = part * (0.5 * H[k, i, j, 0] + 0.5 * H[k, i, j, 1])

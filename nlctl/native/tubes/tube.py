@@ -6,6 +6,7 @@ import functools
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +27,7 @@ from .sets import box_of_set, next_errors, next_polynomials, renewed, slopes_wit
 from .steps import add_up, coefficients, fill_lanes, flow_derivatives, rest_of_step
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MonomialTable:
+class MonomialTable(NamedTuple):
     """The monomials of degree 1 to some degree."""
 
     degrees: np.ndarray  # shape (monomials,); the first ones are the variables themselves
@@ -35,11 +35,6 @@ class MonomialTable:
     # shape (pairs, 3); numbers of two monomials and of their product, as far as that is one
     products: np.ndarray
     has: np.ndarray  # shape (monomials, variables); whether a variable is in it
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """All of it."""
-        return self.degrees, self.even, self.products, self.has
 
 
 @functools.lru_cache(maxsize=16)
@@ -98,7 +93,7 @@ def tube_from(
     low, high = np.full((cells, n), np.inf), np.full((cells, n), -np.inf)
     end, weight = np.empty((n, 2)), np.zeros(n)
     status, time, steps = integrated(
-        code.addresses, code.places, code.folds, table.arrays, box, float(duration),
+        code.addresses, code.places, code.folds, table, box, float(duration),
         np.array(limits, dtype=float), FIRST_ORDER, TOLERANCE, LANES, low, high, end, weight,
     )  # fmt: skip
     return Tube(status=status, time=time, low=low, high=high, end=end, weight=weight, steps=steps)
@@ -115,10 +110,10 @@ def integrated(
     ky, at_end = np.zeros_like(k), np.zeros((groups, 4 * n, 2, lanes))
     boxes, rest, pad = np.zeros_like(at_end), np.zeros_like(at_end), np.zeros_like(at_end)
     read, first = np.zeros((read_rows, 2, lanes)), np.zeros((rows + kept_rows, 2, lanes))
-    c, P, B, r = first_set(box, table[0].size)
+    c, P, B, r = first_set(box, table.degrees.size)
     middle, over, begin = np.empty(n), np.empty((n, 2)), np.empty((n, 2))
     early, late, h, steps, status, first_numbers = 0.0, 0.0, duration, 0, REACHED, True
-    box_of_set(c, P, table[1], B, r, end)
+    box_of_set(c, P, table.even, B, r, end)
     while early < duration:
         for i in range(n):
             middle[i] = 0.5 * c[i, 0] + 0.5 * c[i, 1]
@@ -137,9 +132,9 @@ def integrated(
         carry_on(at_end, table, end, middle, c, P, B, r)
         if first_numbers:
             matter(P, table, box, weight)
-        first_numbers = not renewed(c, P, table[1], B, r, _NEW) and first_numbers
+        first_numbers = not renewed(c, P, table.even, B, r, _NEW) and first_numbers
         write_into(begin, end)
-        box_of_set(c, P, table[1], B, r, end)
+        box_of_set(c, P, table.even, B, r, end)
         range_over_step(ky[0], h, begin, end, over)
         write_limits(over, early / duration, up(late + h) / duration, low, high)
         steps, early, late = steps + 1, down(early + h), up(late + h)
@@ -279,6 +274,6 @@ def matter(P, table, box, weight):
     for j in range(weight.size):
         weight[j] = 0.0
         for a in range(P.shape[1]):
-            if table[3][a, j] and box[j, 0] < box[j, 1]:
-                part = 1.0 if table[0][a] > 1 else 1e-6  # of a linear motion that alone
+            if table.has[a, j] and box[j, 0] < box[j, 1]:
+                part = 1.0 if table.degrees[a] > 1 else 1e-6  # of a linear motion that alone
                 weight[j] += part * np.abs(P[:, a]).sum()

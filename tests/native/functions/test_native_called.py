@@ -198,8 +198,9 @@ def test_a_result_of_another_length_names_the_block():
 
 def python_call(function):
     """A call with one state and one result."""
-    return Call(name="called", block="b", kind="update", lengths=(1, 1, 0, 0, 1), reason="",
-                function=function, source=None)  # fmt: skip
+    return Call(name="called", block="b", kind="update", functions=(function,),
+                lengths=(1, 1, 0, 0, 1), reason="", template={}, slots={}, record=None,
+                system=None)  # fmt: skip
 
 
 @needs_jit
@@ -208,8 +209,8 @@ def test_a_function_that_has_failed_is_not_called_again(error):
     """Nothing is computed on; the error waits for whoever ends the evaluation."""
     calls = []
 
-    def function(given):
-        calls.append(given.copy())
+    def function(t, x, u, params):
+        calls.append([t, *x])
         raise error("once")
 
     call = python_call(function)
@@ -222,7 +223,7 @@ def test_a_function_that_has_failed_is_not_called_again(error):
     c[1:3, 1] = 0.5, 7.0
     for _ in range(3):
         at(c.ctypes.data, 1, 1)
-    assert [list(given) for given in calls] == [[0.5, 7.0]]
+    assert calls == [[0.5, 7.0]]
     assert np.isnan(c[3, 1])
     assert np.isfinite(c[:, 0]).all()
     assert isinstance(native.error(call, c, 1, 1), error)

@@ -9,8 +9,7 @@ from plain_plan import compare
 
 from nlctl.errors import CompileError, ParameterError, UsageError
 from nlctl.native.compiled import compile as compile_diagram
-from nlctl.native.machine.fingerprint import program_key
-from nlctl.native.opaque.called import Source
+from nlctl.native.machine.fingerprint import function_key
 from nlctl.native.purity.objects import frozen
 
 
@@ -176,7 +175,7 @@ def test_the_cache_tells_modules_apart():
             return x
 
         update.__module__ = module
-        keys.add(program_key(Source(source="", names={"update": update})))
+        keys.add(function_key("", {"update": update}))
     assert len(keys) == 2
 
 

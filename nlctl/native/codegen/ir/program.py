@@ -16,7 +16,7 @@ from ..plan import Function
 from ..solver import DONE, GUESS, Solver
 from .loops import LoopWriter
 from .numbers import Writer
-from .text import Body, Module, Turns, constant
+from .text import Body, Module, Turns, constant, pointers
 
 COPY = "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"
 
@@ -57,9 +57,7 @@ def _function(
         writer.numbers(level.numbers)
         for loop in level.loops:
             LoopWriter(writer, loop).write()
-    b.write("ret void")
-    given = ", ".join(f"ptr noalias %{argument}" for argument in function.arguments)
-    return f"define {linkage}void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"
+    return b.function(name, pointers(function.arguments), linkage)
 
 
 def _solver(module: Module, solver: Solver, lanes: int) -> str:
@@ -84,8 +82,4 @@ def _solver(module: Module, solver: Solver, lanes: int) -> str:
     search.end(b.compare("une", b.load("%s", 0), DONE), [])
     for i in range(solver.count):
         b.store(b.load(b.address("s", GUESS + i), 0), entry(str(solver.given + i)))
-    arguments = "ptr %c, i64 %at, i64 %lane"
-    return (
-        f"define internal void @{solver.name}({arguments}) noinline nounwind {{\nentry:\n"
-        f"{b.text()}  ret void\n}}\n"
-    )
+    return b.function(solver.name, "ptr %c, i64 %at, i64 %lane", "internal ", "noinline ")

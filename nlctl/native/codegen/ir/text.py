@@ -8,7 +8,7 @@ instruction would take ten times as long as all the rest.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -77,6 +77,11 @@ class Module:
         return "\n".join([*self.declared, *tables, "", *self.functions.values(), weights])
 
 
+def pointers(names: Iterable[str]) -> str:
+    """Return the arguments of a function of addresses, of which no two overlap."""
+    return ", ".join(f"ptr noalias %{name}" for name in names)
+
+
 Operand = Value | float
 
 
@@ -97,6 +102,12 @@ class Body:
     def text(self) -> str:
         """Return the instructions, one a line."""
         return "".join(f"{line}\n" if line.endswith(":") else f"  {line}\n" for line in self.lines)
+
+    def function(self, name: str, given: str, linkage: str = "", how: str = "") -> str:
+        """Return the text of a function without a result, whose instructions these are."""
+        self.write("ret void")
+        head = f"define {linkage}void @{name}({given}) {how}nounwind"
+        return f"{head} {{\nentry:\n{self.text()}}}\n"
 
     def write(self, text: str) -> None:
         """Add an instruction without a result."""
@@ -297,17 +308,15 @@ class Body:
         self, name: str, make: Callable[..., None], where: str, sizes: Sequence[int], step: int
     ) -> None:
         """Call a function of numbers in memory, each so many behind the one before."""
-        full = f"@nlctl.{name}.{step}{'.portable' if self.portable else ''}"
+        full = f"nlctl.{name}.{step}{'.portable' if self.portable else ''}"
         names = [f"i64 %n{i}" for i in range(len(sizes))]
         if full not in self.module.functions:
             inner = Body(self.module, self.portable)
             make(inner, step, *(Value(f"%n{i}", 0, "i") for i in range(len(sizes))))
-            self.module.functions[full] = (
-                f"define internal void {full}({', '.join(['ptr %a', *names])}) noinline nounwind "
-                f"{{\nentry:\n{inner.text()}  ret void\n}}\n"
-            )
+            taken = ", ".join(["ptr %a", *names])
+            self.module.functions[full] = inner.function(full, taken, "internal ", "noinline ")
         given = [f"ptr {where}", *(f"i64 {n}" for n in sizes)]
-        self.write(f"call void {full}({', '.join(given)})")
+        self.write(f"call void @{full}({', '.join(given)})")
 
     def unless_larger(self, x: Value, limit: float, near: Mapping[str, Value]) -> tuple[Value, ...]:
         """Return values, but those of the C library where |x| is larger than a limit, as seldom."""
