@@ -133,12 +133,20 @@ def found_conditions(
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
         beyond += left
+    of_time |= dict.fromkeys(_sides_of_time(reader.graph, declared, timed))
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
         shown=count, sharp=_sharp(reader, rates, inside - timed),
     )  # fmt: skip
+
+
+def _sides_of_time(graph: Graph, declared: Sequence[Tracer], timed: set[Expr]) -> list[Expr]:
+    """Return on which side of 0 the declared switching functions are that vary with t alone."""
+    # At 0 itself they may be on either.
+    functions = [function for function in _pieces(declared) if function in timed]
+    return [graph.op(order, function, graph.const(0.0)) for function in functions for order in ("lt", "le")]
 
 
 def _entered(
