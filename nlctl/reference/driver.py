@@ -96,14 +96,13 @@ class Driver:
         self._looked_at, self._end = begin, end
         tolerances = self.settings["rtol"], self.settings["atol"]
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
-        t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
+        t, sides, what = begin, None, self.stops.due.get(begin, frozenset())
         with ExitStack() as stack:
             stack.enter_context(supplying(self.known.lines))
             stack.enter_context(happening())
             stack.enter_context(warnings.catch_warnings())
             warnings.filterwarnings("ignore", "lsoda: ", UserWarning)  # a step says so as well
             while True:
-                self.known.reach(t, is_break)
                 stop = (
                     self.known.after(t, self.stops.after(t))
                     if t < end
@@ -127,9 +126,8 @@ class Driver:
                     return
                 if t in self.stops.changes:
                     self.happened.append((t, "", "condition of t", ""))
-                self.known.keep(begun, t, lambda s, pieces=pieces: self._arriving(s, pieces))
+                self._keep((begun, t), pieces, event)
                 what = self.stops.due.get(t, frozenset())
-                is_break = event is not None or self.stops.is_break(t)
 
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
@@ -232,7 +230,10 @@ class Driver:
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
         may_grow &= solver.t_old != self._narrow  # a longer step from there has been refused
         rounded = _ROUNDED * longest + _ULPS * np.spacing(abs(float(solver.t)))
-        if length > rounded or (may_grow and length > 0.5 * bound):
+        if length > rounded:
+            self._narrow = float(solver.t_old)
+            return longest
+        if may_grow and length > 0.5 * bound:
             return longest
         part = self.jumps.followed(solver.t_old + STEP_PLACES.at * length, state)
         if part < 1.0 and part * length > _SHORTEST * self._span:
@@ -267,7 +268,7 @@ class Driver:
 
     def _longest_step(self, t: float, stop: float) -> float:
         """Return how long a step from a time on may be, by samples, functions of t and delays."""
-        known = self.known.longest_step(t, stop)
+        known = self.known.longest_step(t)
         return min(self.settings["max_step"], self.stops.space(t), known)
 
     def _solution(self, solver: Any) -> Callable[[float], np.ndarray]:
@@ -423,9 +424,22 @@ class Driver:
             y = outputs_now(self.system, t, x, self.inputs(t)) if self.system.noutputs else []
             self.rows.append((t, np.asarray(y, dtype=float), x.copy()))
 
-    def _arriving(self, t: float, pieces: list[Any]) -> list[np.ndarray]:
+    def _keep(self, span: tuple[float, float], pieces: list[Any], event: Event | None) -> None:
+        """Keep what has arrived at transport delays between the last two stops.
+
+        Of the side of an event that the run came from: what is kept has no jump in it.
+        """
+        begun, t = span
+        begins, last = [a for a, _ in pieces], event.before if event else t
+
+        def arriving(s: float) -> list[np.ndarray]:
+            k = max(bisect.bisect_left(begins, s) - 1, 0)
+            return self._arriving(min(s, last), pieces[k][1])
+
+        self.known.keep([begun, *begins[1:], t], arriving)
+
+    def _arriving(self, t: float, state: Callable[[float], np.ndarray]) -> list[np.ndarray]:
         """Return what arrives at each transport delay, at a time between the last two stops."""
-        _, state = pieces[max(bisect.bisect_left(pieces, t, key=lambda one: one[0]) - 1, 0)]
         t = min(t, self._last)
         found = {id(part): u for part, _, u in parts_now(self.system, t, state(t), self.inputs(t))}
         return [np.array(found[id(made)]) for made in self.known.lines]
