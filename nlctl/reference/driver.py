@@ -35,6 +35,7 @@ _ROUNDED, _ULPS = 1.0 + 1e-9, 4.0  # times a step, and of its time: what is as l
 _SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
 _STUCK, _SAMES = 1e-5, 40  # part of a run: shorter steps, so many of which are alike
 _LOOKED_AT = 2000  # steps, after each of which it is asked whether rates are noise
+_GAUSS, _SOLVES = np.polynomial.legendre.leggauss(5), 10.0  # tolerances by which a step solves
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -154,8 +155,14 @@ class Driver:
                 continue
             self._note_left(float(solver.t_old), float(solver.t), state)
             event = self._event(solver, state, seen)
+            if event and not self._is_solution(float(solver.t_old), event.before, state):
+                limits = {**bounded, "max_step": bound}
+                solver = self.method(self._rates, solver.t_old, self._held, event.before, **limits)
+                continue
+            if event:
+                self._note(event, seen, state)
             until = event.time if event else float(solver.t)
-            closes = event is not None or solver.status == "finished"
+            closes = event is not None or until >= stop
             self._watch(until, state(until))
             self._record_within(until, state, closes)
             pieces.append((float(solver.t_old), state))
@@ -171,6 +178,28 @@ class Driver:
                 own = self.jumps.switching
                 self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
+            if solver.status == "finished":
+                solver = self.method(self._rates, until, x, stop, **{**bounded, "max_step": bound})
+
+    def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
+        """Whether a step's polynomial solves the equations up to an event in it.
+
+        It has been made of right-hand sides behind the event as well, by a multistep method of
+        these alone.  What rates do where the state moves by the tolerance says nothing.
+        """
+        length = end - begin
+        if not length > _SHORTEST * self._span:
+            return True
+        times = begin + 0.5 * length * (1.0 + _GAUSS[0])
+        slopes = [self._rates(t, state(t)) for t in times.tolist()]
+        left = state(end) - self._held - 0.5 * length * (_GAUSS[1] @ slopes)
+        left[self.jumps.still] = 0.0
+        allowed = self.settings["atol"] + self.settings["rtol"] * np.abs(state(end))
+        if not np.any(np.abs(left) > _SOLVES * allowed):
+            return True
+        k = len(slopes) // 2
+        noise = np.abs(self._rates(times[k], state(times[k]) + allowed) - slopes[k])
+        return not np.any(np.abs(left) > _SOLVES * (allowed + length * noise))
 
     def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str | None) -> Any:
         """Return an integrator that begins where one has failed, explicit where that fails too.
@@ -292,7 +321,7 @@ class Driver:
         rtol, atol = np.max(self.settings["rtol"]), np.min(self.settings["atol"])
         length = solver.t - solver.t_old
         self._longest = max(self._longest, length)
-        event = first_event(
+        return first_event(
             lambda t, rounded=1.0: self._looked(t, rounded * state(t)),
             (float(solver.t_old), float(solver.t)),
             seen,
@@ -300,9 +329,6 @@ class Driver:
             lambda size: _REVERSES * (atol + rtol * size),
             FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
         )
-        if event is not None:
-            self._note(event, seen, state)
-        return event
 
     def _looked(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen, on the side of the next stop that the run comes from."""
