@@ -36,6 +36,7 @@ _SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
 _STUCK, _SAMES = 1e-5, 40  # part of a run: shorter steps, so many of which are alike
 _LOOKED_AT = 2000  # steps, after each of which it is asked whether rates are noise
 _GAUSS, _SOLVES = np.polynomial.legendre.leggauss(5), 10.0  # tolerances by which a step solves
+_MOST_OF, _PARTED = 0.5, 0.1  # of a flow: a step that is looked at; of that: what follows if wrong
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -132,7 +133,7 @@ class Driver:
 
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
-        self._held, self._last = x, self.stops.before(stop)
+        self._begun, self._held, self._last = t, x, self.stops.before(stop)
         rounding = TIME_ROUNDING * max(abs(t), abs(stop), self._span)
         if stop - t <= rounding:  # only that sets them apart
             self._record_within(stop, lambda _: x, closes=True)
@@ -182,10 +183,10 @@ class Driver:
                 solver = self.method(self._rates, until, x, stop, **{**bounded, "max_step": bound})
 
     def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
-        """Whether a step's polynomial solves the equations up to an event in it.
+        """Whether a step's polynomial solves the equations up to an event in it, or its end.
 
-        It has been made of right-hand sides behind the event as well, by a multistep method of
-        these alone.  What rates do where the state moves by the tolerance says nothing.
+        It has been made of right-hand sides behind the event as well, and by a multistep method of
+        none within.  What rates do where the state moves by the tolerance says nothing.
         """
         length = end - begin
         if not length > _SHORTEST * self._span:
@@ -268,7 +269,15 @@ class Driver:
         if part < 1.0 and part * length > _SHORTEST * self._span:
             self._narrow = float(solver.t_old)
             return part * length
-        return self._span / _PLACES if self._slept(solver, state) else 0.0
+        if self._slept(solver, state):
+            return self._span / _PLACES
+        # One that is most of the way from stop to stop has been seen at its ends alone.
+        if length > _MOST_OF * (stop - self._begun) and not self._is_solution(
+            float(solver.t_old), float(solver.t), state
+        ):
+            self._narrow = float(solver.t_old)
+            return _PARTED * length
+        return 0.0
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
