@@ -49,7 +49,7 @@ class Past:
         # from where to where the run goes now, the side from which signals that jump are read
         self.step = (begin, begin)
         # of each block, increasing: when what jumps, or bends, leaves it
-        self._due = [deque([self._arrival(spec, begin)]) for spec in self.specs]
+        self._due: list[deque[float]] = [deque([self._arrival(spec, begin)]) for spec in self.specs]
         self._starts, self._ends, self._pieces = [], [], []
         self.lines: dict[Any, SuppliedOutput] = {}  # what leaves each block
         for number, made in enumerate(blocks):
@@ -84,7 +84,7 @@ class Past:
         for spec, due in zip(self.specs, self._due, strict=True):
             while due and due[0] <= t + TIME_ROUNDING * abs(t):
                 due.popleft()
-            next_stop = min([next_stop, self._arrival(spec, t), *([due[0]] if due else [])])
+            next_stop = min(next_stop, self._arrival(spec, t), due[0] if due else math.inf)
         return stop if stop - next_stop <= TIME_ROUNDING * abs(stop) else next_stop
 
     def _rounding(self, t: float) -> float:
@@ -112,8 +112,12 @@ class Past:
             if spec.varying is not None:
                 found.append((self.end - self.begin) / PLACES)
             if sent >= self.begin:
-                behind = self._ends[bisect_right(self._ends, sent) + 1 :][:1]  # else a stop is near
-                found += [max(b - sent, _LEAST * (self.end - self.begin)) for b in behind]
+                k = bisect_right(self._ends, sent) + 1
+                if k < len(self._ends):  # else a stop is near
+                    length = self._ends[k] - sent
+                    ahead = _sent(spec, min(t + length, self.end)) - sent
+                    length *= min(length / ahead, 1.0) if ahead > 0.0 else 1.0
+                    found.append(max(length, _LEAST * (self.end - self.begin)))
             elif spec.history is not None:
                 found.append((self.begin - _sent(spec, self.begin)) / PLACES)
         return min(found)
