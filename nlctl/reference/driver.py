@@ -138,26 +138,28 @@ class Driver:
         if stop - t <= rounding:  # only that sets them apart
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
-        bounded = self._bounded(t, stop)
-        solver, bound = self.method(self._rates, t, x, stop, **bounded), bounded["max_step"]
         seen = self._first_seen(t, x)
         self.jumps.check_watched(t, seen)
-        pieces: list[Any] = []
+        return self._integrated(stop, sides, seen)
+
+    def _integrated(self, stop: float, sides: np.ndarray, seen: np.ndarray) -> Any:
+        """Integrate from where a flow has begun, step by step, each of which is right."""
+        limits, pieces = self._bounded(self._begun, stop), []
+        solver = self.method(self._rates, self._begun, self._held, stop, **limits)
         while True:
             message = solver.step()
             if message is not None or self._is_stuck(solver):
-                solver = self._begun_again(solver, stop, {**bounded, "max_step": bound}, message)
+                solver = self._begun_again(solver, stop, limits, message)
                 continue
             state = self._solution(solver)
-            if allowed := self._allowed(solver, state, bound, stop):
-                bound = allowed
-                short = self._shortened(solver, stop, {**bounded, "max_step": bound})
+            if allowed := self._allowed(solver, state, limits["max_step"], stop):
+                limits = limits | {"max_step": allowed}
+                short = self._shortened(solver, stop, limits)
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
             self._note_left(float(solver.t_old), float(solver.t), state)
             event = self._event(solver, state, seen)
             if event and not self._is_solution(float(solver.t_old), event.before, state):
-                limits = {**bounded, "max_step": bound}
                 solver = self.method(self._rates, solver.t_old, self._held, event.before, **limits)
                 continue
             if event:
@@ -180,7 +182,7 @@ class Driver:
                 self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
             if solver.status == "finished":
-                solver = self.method(self._rates, until, x, stop, **{**bounded, "max_step": bound})
+                solver = self.method(self._rates, until, x, stop, **limits)
 
     def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
         """Whether a step's polynomial solves the equations up to an event in it, or its end.

@@ -189,7 +189,7 @@ class Past:
 def _fitted(values: np.ndarray) -> np.ndarray:
     """Return the coefficients of polynomials through values at the nodes, without their rounding.
 
-    What rests is a constant to the last digit: compared with itself it is no condition's noise.
+    What rests is a constant to the last digit, and a condition that compares it has no noise.
 
     Shapes: `values` (nodes, n), result (at most nodes, n).
     """
