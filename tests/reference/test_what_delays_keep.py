@@ -195,3 +195,16 @@ def test_a_train_of_pulses_has_its_low_ones_too(engine):
     assert made.states[0, -1] == pytest.approx(
         area * np.sin(2.5 + 5 * np.arange(8)).sum(), abs=1e-7
     )
+
+
+@pytest.mark.parametrize("engine", ["python-control", "native"])
+@pytest.mark.parametrize("end", [9.0, 900.0])
+def test_a_parabola_of_t_that_dips_between_all_looks_has_its_area(engine, end):
+    """4 w / 3, where w is 1 / 450,000 of the longest run."""
+    width = 2e-3
+    bump = ct.nlsys(
+        lambda t, x, u, p: [np.maximum(0.0, 1 - ((t - 2.0007) / width) ** 2)], None, inputs=0,
+        outputs=["z"], states=1, name="bump",
+    )  # fmt: skip
+    made = nlctl.input_output_response(bump, [0, end], 0, 0, engine=engine, rtol=1e-8, atol=1e-10)
+    assert made.states[0, -1] == pytest.approx(4 * width / 3, abs=1e-9)
