@@ -35,6 +35,8 @@ _ROUNDED, _ULPS = 1.0 + 1e-9, 4.0  # times a step, and of its time: what is as l
 _SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
 _STUCK, _SAMES = 1e-5, 40  # part of a run: shorter steps, so many of which are alike
 _LOOKED_AT = 2000  # steps, after each of which it is asked whether rates are noise
+_GAUSS, _SOLVES = np.polynomial.legendre.leggauss(5), 10.0  # tolerances by which a step solves
+_MOST_OF, _PARTED = 0.5, 0.1  # of a flow: a step that is looked at; of that: what follows if wrong
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -96,14 +98,13 @@ class Driver:
         self._looked_at, self._end = begin, end
         tolerances = self.settings["rtol"], self.settings["atol"]
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
-        t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
+        t, sides, what = begin, None, self.stops.due.get(begin, frozenset())
         with ExitStack() as stack:
             stack.enter_context(supplying(self.known.lines))
             stack.enter_context(happening())
             stack.enter_context(warnings.catch_warnings())
             warnings.filterwarnings("ignore", "lsoda: ", UserWarning)  # a step says so as well
             while True:
-                self.known.reach(t, is_break)
                 stop = (
                     self.known.after(t, self.stops.after(t))
                     if t < end
@@ -127,37 +128,44 @@ class Driver:
                     return
                 if t in self.stops.changes:
                     self.happened.append((t, "", "condition of t", ""))
-                self.known.keep(begun, t, lambda s, pieces=pieces: self._arriving(s, pieces))
+                self._keep((begun, t), pieces, event)
                 what = self.stops.due.get(t, frozenset())
-                is_break = event is not None or self.stops.is_break(t)
 
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
-        self._held, self._last = x, self.stops.before(stop)
+        self._begun, self._held, self._last = t, x, self.stops.before(stop)
         rounding = TIME_ROUNDING * max(abs(t), abs(stop), self._span)
         if stop - t <= rounding:  # only that sets them apart
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
-        bounded = self._bounded(t, stop)
-        solver, bound = self.method(self._rates, t, x, stop, **bounded), bounded["max_step"]
         seen = self._first_seen(t, x)
         self.jumps.check_watched(t, seen)
-        pieces: list[Any] = []
+        return self._integrated(stop, sides, seen)
+
+    def _integrated(self, stop: float, sides: np.ndarray, seen: np.ndarray) -> Any:
+        """Integrate from where a flow has begun, step by step, each of which is right."""
+        limits, pieces = self._bounded(self._begun, stop), []
+        solver = self.method(self._rates, self._begun, self._held, stop, **limits)
         while True:
             message = solver.step()
             if message is not None or self._is_stuck(solver):
-                solver = self._begun_again(solver, stop, {**bounded, "max_step": bound}, message)
+                solver = self._begun_again(solver, stop, limits, message)
                 continue
             state = self._solution(solver)
-            if allowed := self._allowed(solver, state, bound, stop):
-                bound = allowed
-                short = self._shortened(solver, stop, {**bounded, "max_step": bound})
+            if allowed := self._allowed(solver, state, limits["max_step"], stop):
+                limits = limits | {"max_step": allowed}
+                short = self._shortened(solver, stop, limits)
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
             self._note_left(float(solver.t_old), float(solver.t), state)
             event = self._event(solver, state, seen)
+            if event and not self._is_solution(float(solver.t_old), event.before, state):
+                solver = self.method(self._rates, solver.t_old, self._held, event.before, **limits)
+                continue
+            if event:
+                self._note(event, seen, state)
             until = event.time if event else float(solver.t)
-            closes = event is not None or solver.status == "finished"
+            closes = event is not None or until >= stop
             self._watch(until, state(until))
             self._record_within(until, state, closes)
             pieces.append((float(solver.t_old), state))
@@ -173,6 +181,28 @@ class Driver:
                 own = self.jumps.switching
                 self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
+            if solver.status == "finished":
+                solver = self.method(self._rates, until, x, stop, **limits)
+
+    def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
+        """Whether a step's polynomial solves the equations up to an event in it, or its end.
+
+        It has been made of right-hand sides behind the event as well, and by a multistep method of
+        none within.  What rates do where the state moves by the tolerance says nothing.
+        """
+        length = end - begin
+        if not length > _SHORTEST * self._span:
+            return True
+        times = begin + 0.5 * length * (1.0 + _GAUSS[0])
+        slopes = [self._rates(t, state(t)) for t in times.tolist()]
+        left = state(end) - self._held - 0.5 * length * (_GAUSS[1] @ slopes)
+        left[self.jumps.still] = 0.0
+        allowed = self.settings["atol"] + self.settings["rtol"] * np.abs(state(end))
+        if not np.any(np.abs(left) > _SOLVES * allowed):
+            return True
+        k = len(slopes) // 2
+        noise = np.abs(self._rates(times[k], state(times[k]) + allowed) - slopes[k])
+        return not np.any(np.abs(left) > _SOLVES * (allowed + length * noise))
 
     def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str | None) -> Any:
         """Return an integrator that begins where one has failed, explicit where that fails too.
@@ -232,13 +262,24 @@ class Driver:
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
         may_grow &= solver.t_old != self._narrow  # a longer step from there has been refused
         rounded = _ROUNDED * longest + _ULPS * np.spacing(abs(float(solver.t)))
-        if length > rounded or (may_grow and length > 0.5 * bound):
+        if length > rounded:
+            self._narrow = float(solver.t_old)
+            return longest
+        if may_grow and length > 0.5 * bound:
             return longest
         part = self.jumps.followed(solver.t_old + STEP_PLACES.at * length, state)
         if part < 1.0 and part * length > _SHORTEST * self._span:
             self._narrow = float(solver.t_old)
             return part * length
-        return self._span / _PLACES if self._slept(solver, state) else 0.0
+        if self._slept(solver, state):
+            return self._span / _PLACES
+        # One that is most of the way from stop to stop has been seen at its ends alone.
+        if length > _MOST_OF * (stop - self._begun) and not self._is_solution(
+            float(solver.t_old), float(solver.t), state
+        ):
+            self._narrow = float(solver.t_old)
+            return _PARTED * length
+        return 0.0
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
@@ -267,7 +308,7 @@ class Driver:
 
     def _longest_step(self, t: float, stop: float) -> float:
         """Return how long a step from a time on may be, by samples, functions of t and delays."""
-        known = self.known.longest_step(t, stop)
+        known = self.known.longest_step(t)
         return min(self.settings["max_step"], self.stops.space(t), known)
 
     def _solution(self, solver: Any) -> Callable[[float], np.ndarray]:
@@ -291,7 +332,7 @@ class Driver:
         rtol, atol = np.max(self.settings["rtol"]), np.min(self.settings["atol"])
         length = solver.t - solver.t_old
         self._longest = max(self._longest, length)
-        event = first_event(
+        return first_event(
             lambda t, rounded=1.0: self._looked(t, rounded * state(t)),
             (float(solver.t_old), float(solver.t)),
             seen,
@@ -299,9 +340,6 @@ class Driver:
             lambda size: _REVERSES * (atol + rtol * size),
             FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
         )
-        if event is not None:
-            self._note(event, seen, state)
-        return event
 
     def _looked(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen, on the side of the next stop that the run comes from."""
@@ -423,9 +461,22 @@ class Driver:
             y = outputs_now(self.system, t, x, self.inputs(t)) if self.system.noutputs else []
             self.rows.append((t, np.asarray(y, dtype=float), x.copy()))
 
-    def _arriving(self, t: float, pieces: list[Any]) -> list[np.ndarray]:
+    def _keep(self, span: tuple[float, float], pieces: list[Any], event: Event | None) -> None:
+        """Keep what has arrived at transport delays between the last two stops.
+
+        Of the side of an event that the run came from: what is kept has no jump in it.
+        """
+        begun, t = span
+        begins, last = [a for a, _ in pieces], event.before if event else t
+
+        def arriving(s: float) -> list[np.ndarray]:
+            k = max(bisect.bisect_left(begins, s) - 1, 0)
+            return self._arriving(min(s, last), pieces[k][1])
+
+        self.known.keep([begun, *begins[1:], t], arriving)
+
+    def _arriving(self, t: float, state: Callable[[float], np.ndarray]) -> list[np.ndarray]:
         """Return what arrives at each transport delay, at a time between the last two stops."""
-        _, state = pieces[max(bisect.bisect_left(pieces, t, key=lambda one: one[0]) - 1, 0)]
         t = min(t, self._last)
         found = {id(part): u for part, _, u in parts_now(self.system, t, state(t), self.inputs(t))}
         return [np.array(found[id(made)]) for made in self.known.lines]

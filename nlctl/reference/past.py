@@ -1,15 +1,18 @@
 """What transport delays need of a run: their signals so far, as polynomials through its solution.
 
 The method of steps: a run stops after the shortest delay at the latest, so that all that leaves a
-delay until the next stop is known.  Signals are kept as Chebyshev polynomials; a piece whose
-polynomials do not settle is halved.
+delay until the next stop is known.  Signals are kept as Chebyshev polynomials, each of which
+settles and goes through what the ends of the integrator's steps have seen: the past knows of a
+pulse that a step was short for.  Where none does, it is divided between steps, and in one step
+into halves.
 """
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +30,10 @@ _DEGREE = 12
 _NODES = chebyshev.chebpts2(_DEGREE + 1)
 _FITTED = np.linalg.inv(chebyshev.chebvander(_NODES, _DEGREE))
 _HALVINGS = 12
-_STEPS = 256  # of the longest step between two stops
+_ROUNDED = 1e-15  # of a signal: coefficients that are rounding
+_LEAST = 1e-9  # of a run: no step is shorter for what leaves a delay
+_JUMPS, _KINKS = 10.0, 1e3  # tolerances: from where on a signal jumps between two pieces, or bends
+_ORDERS = np.arange(_DEGREE + 1)
 _ASIDE = 1e-9  # part of a step: what lies so close to its end is read from inside
 
 
@@ -40,9 +46,10 @@ class Past:
         # Of transport delays with the parameters of the run; polynomials settle to rtol and atol.
         self.specs: list[Any] = [made.current_spec for made in blocks]
         self.begin, self.end, self._tolerances = begin, end, tolerances
-        # from where to where the run goes now, the side from which signals that jump are read; and
-        # times at which a signal, or one of its derivatives, jumps
-        self.step, self.breaks = (begin, begin), []
+        # from where to where the run goes now, the side from which signals that jump are read
+        self.step = (begin, begin)
+        # of each block, increasing: when what jumps, or bends, leaves it
+        self._due: list[deque[float]] = [deque([self._arrival(spec, begin)]) for spec in self.specs]
         self._starts, self._ends, self._pieces = [], [], []
         self.lines: dict[Any, SuppliedOutput] = {}  # what leaves each block
         for number, made in enumerate(blocks):
@@ -69,20 +76,16 @@ class Past:
             return spec.earlier(min(s, self.begin))
         k = max(bisect_right(self._starts, inside) - 1, 0)
         a, b = self._starts[k], self._ends[k]
-        return np.asarray(chebyshev.chebval((2.0 * s - a - b) / (b - a), self._pieces[k][number]))
+        return _at(self._pieces[k][number], (2.0 * s - a - b) / (b - a))
 
     def after(self, t: float, stop: float) -> float:
         """Return the next stop: that one, or where a break or the first unknown signal leaves."""
-        if not self.specs:
-            return stop
-        later = [self._arrival(spec, s) for s in self.breaks for spec in self.specs]
-        ahead = (s for s in later if s > t + TIME_ROUNDING * abs(t))
-        next_stop = min([stop, *(self._arrival(spec, t) for spec in self.specs), *ahead])
-        next_stop = stop if stop - next_stop <= TIME_ROUNDING * abs(stop) else next_stop
-        least = self._rounding(next_stop)  # pieces may be as short as that
-        while next_stop - t > max(_STEPS * min(self._read(t, next_stop), default=math.inf), least):
-            next_stop = t + 0.5 * (next_stop - t)  # short steps only where they are needed
-        return next_stop
+        next_stop = stop
+        for spec, due in zip(self.specs, self._due, strict=True):
+            while due and due[0] <= t + TIME_ROUNDING * abs(t):
+                due.popleft()
+            next_stop = min(next_stop, self._arrival(spec, t), due[0] if due else math.inf)
+        return stop if stop - next_stop <= TIME_ROUNDING * abs(stop) else next_stop
 
     def _rounding(self, t: float) -> float:
         """Return what rounding alone may set two times apart by, at a time of the run (s)."""
@@ -97,70 +100,115 @@ class Past:
         found: Any = brentq(lambda t: _sent(spec, t) - s, self.begin, self.end, xtol=1e-14)
         return float(found)
 
-    def longest_step(self, a: float, b: float) -> float:
-        """Return how long steps from a to b may be to go over no pulse that leaves a delay.
+    def longest_step(self, t: float) -> float:
+        """Return how long a step from a time on may be to go over no pulse that leaves a delay.
 
-        A function that nobody knows between two places is looked at at 1000; pieces of the past
-        are shorter the faster their signals move.
+        It ends in the piece behind the one in which it begins: pieces are shorter the faster their
+        signals move.  A function that nobody knows between two places is looked at at 1000.
         """
-        found = self._read(a, b)
+        found = [math.inf]
         for spec in self.specs:
+            sent = _sent(spec, t)
             if spec.varying is not None:
                 found.append((self.end - self.begin) / PLACES)
-            if spec.history is not None and _sent(spec, a) < self.begin:
+            if sent >= self.begin:
+                k = bisect_right(self._ends, sent) + 1
+                if k < len(self._ends):  # else a stop is near
+                    length = self._ends[k] - sent
+                    ahead = _sent(spec, min(t + length, self.end)) - sent
+                    length *= min(length / ahead, 1.0) if ahead > 0.0 else 1.0
+                    found.append(max(length, _LEAST * (self.end - self.begin)))
+            elif spec.history is not None:
                 found.append((self.begin - _sent(spec, self.begin)) / PLACES)
-        return min(found, default=math.inf)
+        return min(found)
 
-    def _read(self, a: float, b: float) -> list[float]:
-        """Return the lengths of the pieces that leave delays from a to b.
-
-        Of three together: one alone may be what is left between two breaks.
-        """
-        starts, ends = self._starts, self._ends
-        return [
-            (ends[k + 2] - starts[k]) / 3
-            for spec in self.specs
-            for k in range(
-                bisect_right(ends, _sent(spec, a)), bisect_right(starts, _sent(spec, b)) - 2
-            )
-        ]
-
-    def reach(self, t: float, is_break: bool) -> None:
-        """Note a stop: a break, or where one leaves a delay; those that all have left are gone."""
-        if not self.specs:
+    def keep(self, ends: Sequence[float], arriving: Callable[[float], list[np.ndarray]]) -> None:
+        """Keep what has arrived at each delay, ``arriving(t)``, where steps begin and end."""
+        if not self.specs or ends[-1] - ends[0] <= self._rounding(ends[-1]):
             return
-        near = TIME_ROUNDING * abs(t)
-        left = (self._arrival(spec, s) for s in self.breaks for spec in self.specs)
-        if is_break or any(abs(s - t) <= near for s in left):
-            oldest = min(_sent(spec, t) for spec in self.specs)
-            self.breaks = [s for s in self.breaks if s > oldest - 1e-9 * abs(t)]
-            if not self.breaks or self.breaks[-1] != t:
-                self.breaks.append(t)
+        first = len(self._starts)
+        self._keep(list(ends), [arriving(t) for t in ends], arriving, 0)
+        if first:
+            self._note_breaks(first)
 
-    def keep(
-        self, a: float, b: float, arriving: Callable[[float], list[np.ndarray]], halvings: int = 0
+    def _keep(
+        self, ends: list[float], seen: list[list[np.ndarray]], arriving: Any, halvings: int
     ) -> None:
-        """Keep what has arrived from a to b, at each delay: ``arriving(t)``."""
-        if not self.specs or b - a <= self._rounding(b):
-            return
+        """Keep what has arrived, divided between steps until one polynomial says it."""
+        a, b = ends[0], ends[-1]
         nodes = 0.5 * ((b - a) * _NODES + (a + b))
-        nodes[0], nodes[-1] = a, b
-        seen = [arriving(float(t)) for t in nodes]
-        pieces = [_FITTED @ np.array(own) for own in zip(*seen, strict=True)]
-        if halvings < _HALVINGS and not all(map(self._settled, pieces)):
+        values = [seen[0], *(arriving(float(t)) for t in nodes[1:-1]), seen[-1]]
+        pieces = [_fitted(np.array(signals)) for signals in zip(*values, strict=True)]
+        inside = (2.0 * np.array(ends[1:-1]) - a - b) / (b - a)
+        is_right = all(
+            self._says(piece, inside, np.array([one[number] for one in seen[1:-1]]))
+            for number, piece in enumerate(pieces)
+        )
+        if not is_right and len(ends) > 2:
+            k = 1 + int(np.argmin(np.abs(inside)))
+            self._keep(ends[: k + 1], seen[: k + 1], arriving, halvings)
+            self._keep(ends[k:], seen[k:], arriving, halvings)
+        elif not is_right and halvings < _HALVINGS:
             middle = 0.5 * (a + b)
-            self.keep(a, middle, arriving, halvings + 1)
-            self.keep(middle, b, arriving, halvings + 1)
-            return
-        self._starts.append(a)
-        self._ends.append(b)
-        self._pieces.append(pieces)
+            there = arriving(middle)
+            self._keep([a, middle], [seen[0], there], arriving, halvings + 1)
+            self._keep([middle, b], [there, seen[-1]], arriving, halvings + 1)
+        else:
+            self._starts.append(a)
+            self._ends.append(b)
+            self._pieces.append(pieces)
 
-    def _settled(self, piece: np.ndarray) -> bool:
-        """Whether the last coefficients of a polynomial are within the tolerance."""
+    def _says(self, piece: np.ndarray, places: np.ndarray, seen: np.ndarray) -> bool:
+        """Whether a polynomial has settled, and is what has been seen at some places of it."""
+        allowed = self._allowed(piece)
+        if not np.all(np.abs(piece[_DEGREE - 1 :]) <= allowed):
+            return False
+        guessed = _at(piece, places[:, None])
+        return bool(np.all(np.abs(guessed - seen.reshape(guessed.shape)) <= allowed))
+
+    def _allowed(self, piece: np.ndarray) -> np.ndarray:
+        """Return the tolerances of a piece's signals."""
         rtol, atol = self._tolerances
-        size = np.abs(piece).sum(axis=0)
-        return bool(np.all(np.abs(piece[-2:]) <= atol + rtol * size))
+        return atol + rtol * np.abs(piece).sum(axis=0)
+
+    def _note_breaks(self, k: int) -> None:
+        """Note which signals jump, or bend, where a piece begins, and when that leaves."""
+        begin, before = self._starts[k], self._ends[k - 1] - self._starts[k - 1]
+        behind = self._ends[k] - begin
+        short = 2.0 * min(before, behind)
+        for number, spec in enumerate(self.specs):
+            left, right = self._pieces[k - 1][number], self._pieces[k][number]
+            allowed = np.maximum(self._allowed(left), self._allowed(right))
+            jump = _at(right, -1.0) - _at(left, 1.0)
+            bend = short * (_slope(right, -1.0) / behind - _slope(left, 1.0) / before)
+            calm = (np.abs(jump) <= _JUMPS * allowed) & (np.abs(bend) <= _KINKS * allowed)
+            if not np.all(calm):
+                self._due[number].append(self._arrival(spec, begin))
+
+
+def _fitted(values: np.ndarray) -> np.ndarray:
+    """Return the coefficients of polynomials through values at the nodes, without their rounding.
+
+    What rests is a constant to the last digit, and a condition that compares it has no noise.
+
+    Shapes: `values` (nodes, n), result (at most nodes, n).
+    """
+    least, most = values.min(axis=0), values.max(axis=0)
+    found = np.where(least == most, (_ORDERS == 0)[:, None] * least, _FITTED @ values)
+    calm = np.abs(found) <= _ROUNDED * np.abs(values).max(axis=0)  # NaN is not
+    last = np.flatnonzero(~np.all(calm, axis=1))
+    return found[: int(last[-1]) + 1 if last.size else 1]
+
+
+def _at(piece: np.ndarray, z: Any) -> np.ndarray:
+    """Return polynomials at a place between -1 and 1, or at places in a column."""
+    return np.cos(_ORDERS[: len(piece)] * np.arccos(np.clip(z, -1.0, 1.0))) @ piece
+
+
+def _slope(piece: np.ndarray, end: float) -> np.ndarray:
+    """Return the slopes of polynomials at -1 or at 1."""
+    orders = _ORDERS[: len(piece)]
+    return (orders**2 * end ** (orders + 1)) @ piece
 
 
 def _sent(spec: TransportDelay, t: float) -> float:

@@ -35,8 +35,7 @@ class Stops:
         self.longest, self._changes = conditions.longest, conditions.stops
         self.changes = frozenset(conditions.stops[1].tolist())
         known = (due.times, _break_points(times, inputs), conditions.stops[1])
-        self.breaks = np.unique(np.concatenate(known))
-        every = np.union1d(self.breaks, np.append(self.borders, end))
+        every = np.union1d(np.concatenate(known), np.append(self.borders, end))
         self.times = every[(every > begin) & (every <= end)]
 
     def after(self, t: float) -> float:
@@ -48,11 +47,6 @@ class Stops:
         until, changed = self._changes
         later = until[np.searchsorted(changed, t) :][:1]
         return float(np.min([np.nextafter(t, -np.inf), *later]))
-
-    def is_break(self, t: float) -> bool:
-        """Whether a signal or one of its derivatives may jump at a stop."""
-        k = np.searchsorted(self.breaks, t)
-        return bool(k < self.breaks.size and self.breaks[k] == t)
 
     def space(self, t: float) -> float:
         """Return how long steps may be: the shortest space of output samples near a time (s).

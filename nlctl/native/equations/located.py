@@ -287,14 +287,25 @@ def _moving(
 ) -> tuple[tuple[tuple[Expr, ...], ...], tuple[Expr, ...]]:
     """Return the angular frequencies of products of sines, and the terms that are none."""
     waves: dict[tuple[Expr, ...], None] = {}
-    pulses = []
+    pulses: dict[Expr, None] = {}
     for term in terms:
         frequencies = _frequencies(graph, term, timed)
         if frequencies is None:
-            pulses.append(term)
+            pulses |= dict.fromkeys(_pulses(graph, term, timed))
         elif frequencies:
             waves[frequencies] = None
     return tuple(waves), tuple(pulses)
+
+
+def _pulses(graph: Graph, term: Expr, timed: set[Expr]) -> list[Expr]:
+    """Return a function of t with the factors in it that are no waves.
+
+    In a train of pulses that a wave modulates, one may be low; as a factor it is as high as others.
+    """
+    factors = term.args if term.op == "mul" else ()
+    alone = (arg for arg in factors if arg in timed and arg.op != "leaf")
+    sought = (arg for arg in alone if _frequencies(graph, arg, timed) is None)
+    return [term, *(pulse for arg in sought for pulse in _pulses(graph, arg, timed))]
 
 
 def _frequencies(graph: Graph, term: Expr, timed: set[Expr]) -> tuple[Expr, ...] | None:

@@ -59,10 +59,10 @@ def break_points(
             crossed = levels_met(condition, lines, constant)
             if crossed is not None:
                 levels = [partial(_how_many, condition)]
-        for level in levels:
+        for k, level in enumerate(levels):
             indicator: Indicator = partial(level, values)
             if crossed is None:
-                at = _sought(indicator, span, fastest)
+                at = _sought(indicator, partial(_compared, condition, k, values), span, fastest)
             else:
                 at = _exact(indicator, crossed, span)
             at = at[(at > span[0]) & (at <= span[1])]
@@ -130,12 +130,7 @@ def _how_many(condition: Expr, values: Values, t: np.ndarray) -> np.ndarray:
 
 def _level(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray:
     """Return the indicator of an element."""
-    op, args = condition.op, condition.args
-
-    def element(array: np.ndarray) -> np.ndarray:
-        rows = array if array.ndim == 2 else array[None]
-        return np.broadcast_to(rows[k if len(rows) > 1 else 0], t.shape)
-
+    op, args, element = condition.op, condition.args, partial(_element, k, t)
     with np.errstate(all="ignore"):
         if condition.kind == "b" or op in ("floor", "ceil", "trunc", "rint", "sign", "heaviside"):
             return element(values([condition], t)[0]).astype(float)
@@ -149,6 +144,38 @@ def _level(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray
         return (a < 0.0).astype(float)
 
 
+def _element(k: int, t: np.ndarray, array: np.ndarray) -> np.ndarray:
+    """Return one row of values at some times."""
+    rows = array if array.ndim == 2 else array[None]
+    return np.broadcast_to(rows[k if len(rows) > 1 else 0], t.shape)
+
+
+def _compared(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray:
+    """Return what an element of a condition compares with 0, as far as that is a difference."""
+    args = condition.args
+    with np.errstate(all="ignore"):
+        if condition.op in ("abs", "sign", "heaviside"):
+            return _element(k, t, values([args[0]], t)[0])
+        if len(args) == 2 and condition.op not in ("remainder", "fmod", "copysign"):
+            a, b = (_element(k, t, array) for array in values(list(args), t))
+            return a * 1.0 - b * 1.0
+    return np.ones(t.size)
+
+
+def _dips(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return times at which a parabola through three values is on another side than they are.
+
+    A quadratic function is that parabola, however narrow it dips.
+    """
+    before, here, behind = values[:-2], values[1:-1], values[2:]
+    with np.errstate(all="ignore"):
+        slope, bend = 0.5 * (behind - before), behind - 2.0 * here + before
+        at, least = -slope / bend, here - 0.5 * slope**2 / bend
+        crosses = (np.abs(at) <= 1.0) & (here * before > 0.0) & (here * behind > 0.0)
+        crosses &= least * here < 0.0
+    return t[1:-1][crosses] + at[crosses] * (t[1] - t[0])
+
+
 def _exact(indicator: Indicator, places: np.ndarray, span: tuple[float, float]) -> np.ndarray:
     """Return the numbers at which an indicator changes near `places`."""
     if not places.size:
@@ -159,11 +186,14 @@ def _exact(indicator: Indicator, places: np.ndarray, span: tuple[float, float]) 
     return _bisected(indicator, places - width, places + width, places)
 
 
-def _sought(indicator: Indicator, span: tuple[float, float], fastest: float) -> np.ndarray:
+def _sought(
+    indicator: Indicator, compared: Indicator, span: tuple[float, float], fastest: float
+) -> np.ndarray:
     """Return where an indicator changes on a grid that is fine enough for its fastest sine."""
     waves = fastest * (span[1] - span[0]) / (2.0 * np.pi)
     count = int(min(max(_GRID, _PER_WAVE * waves), _MOST))
     t = np.linspace(*span, count + 1)
+    t = np.union1d(t, _dips(t, compared(t)))
     level = indicator(t)
     at = np.flatnonzero(level[1:] != level[:-1])
     return _bisected(indicator, t[at], t[at + 1], None)
