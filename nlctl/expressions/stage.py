@@ -333,7 +333,7 @@ class Stage:
             if not staged.holds_tracers(arguments):
                 return of_numbers(*arguments)
             if len(arguments) != count:
-                raise Untraceable(f"{operation} with other arguments")
+                return self._of_more(operation, function, arguments)
             if operation == "power":
                 result = traced(self.graph, arguments[0]) ** arguments[1]
             else:
@@ -341,6 +341,14 @@ class Stage:
             return of_math(self.graph, operation, result, arguments)
 
         return function
+
+    def _of_more(self, operation: str, one: Any, arguments: tuple[Any, ...]) -> Any:
+        """Return a function of math of more arguments than NumPy's takes."""
+        if operation == "log" and len(arguments) == 2:  # to a base
+            return one(arguments[0]) / one(arguments[1])
+        if operation == "hypot" and len(arguments) > 2:
+            return functools.reduce(one, arguments)
+        raise Untraceable(f"{operation} with other arguments")
 
     def _of_python(self, function: object) -> Any:
         """Return a function of math whose results are numbers of Python's own."""

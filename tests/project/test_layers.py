@@ -81,6 +81,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["signs"],
         ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
+        ["integers"],
         ["arrays", "operators", "masked", "indexing", "edges"],
         ["sharp", "without_poles"],
         [

@@ -6,6 +6,7 @@ What NumPy computes by moving elements, adding and multiplying, it computes itse
 
 from . import (
     complex_numbers,
+    counted,
     creation,
     elementary,
     linear_algebra,
@@ -22,6 +23,7 @@ from . import (
 
 __all__ = [
     "complex_numbers",
+    "counted",
     "creation",
     "elementary",
     "linear_algebra",

@@ -197,6 +197,8 @@ class Builtins:
         """Python's min and max: the first of those that no other is beyond."""
         values = list(values[0]) if len(values) == 1 else list(values)  # type: ignore[assignment]
         key = options.pop("key", None)
+        if values:
+            options.pop("default", None)
         keys = [v if key is None else key(v) for v in values]
         if not any(map(is_traced, (*values, *keys))):
             return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)

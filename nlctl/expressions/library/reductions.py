@@ -131,8 +131,16 @@ def _count(array: Tracer, axis: Axis) -> float:
 
 
 @of(np.mean)
-def mean(graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False) -> Any:
+def mean(
+    graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False,
+    where: object = True,
+) -> Any:  # fmt: skip
     """Return a mean."""
+    if where is not True:
+        chosen = elementwise(graph, "select", where, 1.0, elementwise(graph, "mul", values, 0.0))
+        chosen = elementwise(graph, "ne", where, 0.0) if traced(graph, where).shape else chosen
+        parts = sum_along(graph, values, axis, keepdims=keepdims, where=where)
+        return elementwise(graph, "div", parts, sum_along(graph, chosen, axis, keepdims=keepdims))
     if isinstance(values, Masked):
         return values.mean()
     if isinstance(values, ComplexPair):
@@ -268,13 +276,13 @@ def _along(graph: Graph, values: object, axis: Any, function: Callable[..., list
 
 
 @of(np.sort)
-def sort(graph: Graph, values: object, axis: object = -1) -> Tracer:
+def sort(graph: Graph, values: object, axis: object = -1, **_how: object) -> Tracer:
     """Return an array in order."""
     return _along(graph, values, axis, lambda row: in_order(graph, row)[0])
 
 
 @of(np.argsort)
-def argsort(graph: Graph, values: object, axis: object = -1) -> Tracer:
+def argsort(graph: Graph, values: object, axis: object = -1, **_how: object) -> Tracer:
     """Return where the elements of an ordered array were."""
     # Equal ones stay in their order; NumPy's own depends on the machine there.
     if traced(graph, values).shape[-1] > 16:
@@ -345,7 +353,7 @@ def corrcoef(np: Facade, x: object, y: object = None) -> Tracer:
     return np.clip(correlations, -1.0, 1.0)
 
 
-def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:
+def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1, **_how: object) -> None:
     """Put an array in order."""
     values[...] = sort(graph, values, axis)
 

@@ -59,7 +59,7 @@ VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d
          "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
          "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
          "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
-         "to_numpy"}  # fmt: skip
+         "to_numpy", "sliding_window_view"}  # fmt: skip
 WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
            "insort_left", "insort_right"}  # fmt: skip
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
@@ -448,7 +448,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     name = getattr(thing, "__name__", "")
     if name in _SEEDED and given.places and type(given.places[0].known) is int:
         return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
-    if module.startswith(VARYING):
+    if module.startswith(VARYING) and not module.startswith("numpy.lib.stride_tricks"):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
         raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
