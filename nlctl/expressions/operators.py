@@ -310,7 +310,7 @@ def _power(base: Any, exponent: Any) -> Any:
         return elementwise(exponent.graph, "power", base, exponent)
     if not isinstance(base, Tracer):
         return base**exponent
-    if base.graph.attempts and not _is_numpys(base.graph, base):
+    if base.graph.attempts and not is_numpys(base.graph, base):
         raise Untraceable("try around a power of what may be Python's own numbers")
     if isinstance(exponent, int | np.integer) and abs(exponent) <= 64:
         return mapped_cells(base, lambda e: base.graph.power(e, int(exponent)))
@@ -357,11 +357,11 @@ def _ask_divisor(graph: Graph, a: object, b: object) -> None:
         return  # formulas of functions of NumPy divide as NumPy does
     if _is_pythons(a) and _is_pythons(b):
         graph.guard(elementwise(graph, "ne", b, 0.0).only, ZeroDivisionError)
-    elif not (_is_numpys(graph, a) or _is_numpys(graph, b)):
+    elif not (is_numpys(graph, a) or is_numpys(graph, b)):
         raise Untraceable("try around a division of what may be Python's own numbers")
 
 
-def _is_numpys(graph: Graph, value: object) -> bool:
+def is_numpys(graph: Graph, value: object) -> bool:
     """Whether a number is known to be one of NumPy's: it is made of states or inputs."""
     if not isinstance(value, Tracer) or value.shape:
         return isinstance(value, Tracer | np.ndarray | np.generic)
@@ -430,8 +430,11 @@ for _name, _method in {
     "divmod": lambda self, other: (self // other, self % other),
     "rdivmod": lambda self, other: (other // self, other % self),
     "pos": lambda self: self,
-    **{f"{back}{name}shift": _shift(way, bool(back)) for name, way in (("l", 1), ("r", -1))
-       for back in ("", "r")},
+    **{
+        f"{back}{name}shift": _shift(way, bool(back))
+        for name, way in (("l", 1), ("r", -1))
+        for back in ("", "r")
+    },
     "matmul": lambda self, other: _matrix_product(self.graph, self, other),
     "rmatmul": lambda self, other: _matrix_product(self.graph, other, self),
 }.items():

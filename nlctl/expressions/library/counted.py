@@ -42,7 +42,9 @@ def histogram(
     np_ = Facade(graph)
     share = None if weights is None else traced(graph, weights).short().reshape(-1)
     both = [np_.logical_and(*pair) for pair in zip(beyond, inside, strict=True)]
-    counts = traced(graph, [np_.sum(b if share is None else np_.where(b, share, 0.0)) for b in both])
+    counts = traced(
+        graph, [np_.sum(b if share is None else np_.where(b, share, 0.0)) for b in both]
+    )
     if density:
         counts = counts / np.diff(edges) / np_.sum(counts)
     return counts, traced(graph, edges) if edges.dtype == float else edges

@@ -15,7 +15,7 @@ from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
 from ..operators import elementwise, total, with_counts
 from .complex_numbers import ComplexPair
-from .table import ARRAY_METHODS, Facade, constant_value, formula, of
+from .table import ARRAY_METHODS, WRITTEN, Facade, constant_value, formula, of
 
 __all__: list[str] = []
 
@@ -358,6 +358,9 @@ def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1, **_how: object
     values[...] = sort(graph, values, axis)
 
 
+_SINGULAR = np.linalg.svd
+
+
 @formula(np.linalg.norm)
 def norm(
     np: Facade, x: object, ord: Any = None, axis: object = None,  # noqa: A002
@@ -373,6 +376,9 @@ def norm(
         return (np.max if ord > 0 else np.min)(size, axis=axis, keepdims=keepdims)
     if ord == 1 and x.ndim != 2:
         return np.sum(size, axis=axis, keepdims=keepdims)
+    if x.ndim == 2 and axis is None and ord in (2, -2, "nuc"):
+        values = WRITTEN[_SINGULAR](np.graph, x, compute_uv=False)
+        return np.sum(values) if ord == "nuc" else values[0 if ord == 2 else -1]
     is_euclidean = ord is None or ord == "fro" or (ord == 2 and (x.ndim == 1 or axis is not None))
     if not is_euclidean:
         raise Untraceable(f"the norm {ord!r} of this array")
