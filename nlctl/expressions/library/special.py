@@ -210,16 +210,6 @@ def _relative_exponential(np: Facade, x: Any) -> Any:
     return np.where(x == 0.0, 1.0, np.expm1(x) / np.where(x == 0.0, 1.0, x))
 
 
-def _scaled_complement(np: Facade, x: Any) -> Any:
-    """e^(x^2) erfc x: far to the right by its asymptotic series (DLMF 7.12.1)."""
-    far = x > 25.0
-    near = np.where(far, 1.0, x)
-    square = 0.5 / (x * x)
-    series = 1.0 - square * (1.0 - 3.0 * square * (1.0 - 5.0 * square * (1.0 - 7.0 * square)))
-    value = np.exp(near * near) * _elementwise("erfc", np.graph, near)
-    return np.where(far, series / (x * math.sqrt(math.pi)), value)
-
-
 _logarithm_of_beta = integral_functions.betaln(loggamma_of_size)
 _OF_INTEGRALS = {
     **{name: getattr(integral_functions, name) for name in ("ellipk", "ellipe", "erfinv",
@@ -227,7 +217,6 @@ _OF_INTEGRALS = {
     "betaln": _logarithm_of_beta,
     "beta": lambda np, a, b: np.exp(_logarithm_of_beta(np, a, b)),
     "exprel": _relative_exponential,
-    "erfcx": _scaled_complement,
     "entr": lambda np, x: np.where(x > 0.0, -x * np.log(np.where(x > 0.0, x, 1.0)),
                                    np.where(x == 0.0, 0.0, np.where(x < 0.0, -math.inf, x))),
     "log_softmax": lambda np, x, axis=None: x - _kept_logsumexp(np, x, axis),

@@ -83,8 +83,16 @@ def piecewise_polynomial(
     if nu:
         interpolant = interpolant.derivative(nu)
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
-    if interpolant.c.ndim != 2 or interpolant.c.dtype != float or extrapolate == "periodic":
-        raise Untraceable("a piecewise polynomial with several values, or with a period")
+    if interpolant.c.dtype != float or extrapolate == "periodic":
+        raise Untraceable("a piecewise polynomial with a period, or of complex numbers")
+    if interpolant.c.ndim == 3 and not nu:
+        from scipy.interpolate import PPoly
+
+        columns = [PPoly(interpolant.c[:, :, k], interpolant.x, extrapolate=bool(extrapolate))
+                   for k in range(interpolant.c.shape[2])]  # fmt: skip
+        return _in_columns(graph, columns, piecewise_polynomial, x)
+    if interpolant.c.ndim != 2:
+        raise Untraceable("a piecewise polynomial whose values are matrices")
     breaks, coefficients = interpolant.x, interpolant.c
     if breaks.size > MOST_PIECES or np.any(np.diff(breaks) <= 0):
         raise Untraceable("a piecewise polynomial with too many pieces")
@@ -95,6 +103,15 @@ def piecewise_polynomial(
         return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
     return _elementwise(graph, x, at)
+
+
+def _in_columns(
+    graph: Graph, columns: Sequence[Any], written: Callable[..., Any], x: Arithmetic
+) -> Tracer:
+    """Return several values at each place, by a function of one value for each of them."""
+    values = [traced(graph, written(graph, column, x)).short() for column in columns]
+    cells = np.stack([v.elements() for v in values], axis=-1)
+    return Tracer(graph, cells)
 
 
 def _beyond(
@@ -116,6 +133,12 @@ def b_spline(graph: Graph, interpolant: Any, x: Any, nu: int = 0, extrapolate: A
     from scipy.interpolate import PPoly
 
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
+    if interpolant.c.ndim == 2 and not nu and extrapolate != "periodic":
+        from scipy.interpolate import BSpline
+
+        columns = [BSpline(interpolant.t, c, interpolant.k, bool(extrapolate))
+                   for c in interpolant.c.T]  # fmt: skip
+        return _in_columns(graph, columns, b_spline, x)
     if interpolant.c.ndim != 1 or extrapolate == "periodic":
         raise Untraceable("a spline with several values, or with a period")
     knots = np.unique(interpolant.t[interpolant.k : interpolant.t.size - interpolant.k])
@@ -175,6 +198,8 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
     """Return SciPy's interp1d."""
     kind = getattr(interpolant, "_kind", "")
     values = np.asarray(interpolant.y, dtype=float)
+    if values.ndim == 2 and interpolant.axis in (0, -2):
+        return _in_columns(graph, _of_columns(interpolant, values), table_of_one, x)
     if values.ndim != 1:
         raise Untraceable("a table with several values")
     if kind in ("linear", "linear-np", "slinear") and not hasattr(interpolant, "_spline"):
@@ -200,6 +225,18 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
         return _beyond(graph, e, ends, value, below, above)
 
     return _elementwise(graph, x, at)
+
+
+def _of_columns(interpolant: Any, values: np.ndarray) -> list[Any]:
+    """Return a table of one value for each column of one of several."""
+    fill = "extrapolate" if interpolant._extrapolate else interpolant.fill_value
+    ends = fill if isinstance(fill, tuple) else (fill,)
+    if not interpolant._extrapolate and any(np.ndim(end) for end in ends):
+        raise Untraceable("a table with several values, and with others for each beyond its ends")
+    spline = getattr(interpolant, "_spline", None)
+    kind = interpolant._kind if spline is None else spline.k
+    how = {"kind": kind, "fill_value": fill, "bounds_error": interpolant.bounds_error}
+    return [type(interpolant)(interpolant.x, column, **how) for column in values.T]
 
 
 _STEPS = ("nearest", "nearest-up", "previous", "next")
