@@ -1,30 +1,24 @@
-"""Matrices by reflections and rotations: QR, least squares of full rank, singular values.
+"""Matrices by reflections: QR, least squares of full rank; roots of matrices, Lyapunov's equation.
 
-Sources: LAPACK's ``dgeqr2`` and ``dlarfg`` for the signs of reflections; G. H. Golub and C. F.
-Van Loan, Matrix Computations, 4th ed., 2013, sections 8.5 and 8.6, for Jacobi's rotations.
+Source: LAPACK's ``dgeqr2`` and ``dlarfg`` for the signs of reflections.
 """
 
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from .linear_algebra import solved
-from .reductions import sort
 from .table import Facade, constant_value
 
 __all__: list[str] = []
 
 _LARGEST = 6  # rows or columns of what is written out
-_TURNED = 4  # columns that are made orthogonal by rotations
-_SWEEPS = 6  # over all pairs, after which four columns are orthogonal to the last digits
 _DEPENDENT = 1e-10  # part of a column that is left by the others, below which its sign is noise
 _WORST = 1e-12  # reciprocal condition number below which a rank is a question of rounding
 
@@ -40,9 +34,9 @@ def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
                             a[0] * b[0])  # fmt: skip
 
 
-def _columns(graph: Graph, matrix: object, most: int = _LARGEST) -> _Columns:
+def _columns(graph: Graph, matrix: object) -> _Columns:
     array = traced(graph, matrix).short()
-    if array.ndim != 2 or not array.size or max(array.shape) > _LARGEST or min(array.shape) > most:
+    if array.ndim != 2 or not array.size or max(array.shape) > _LARGEST:
         raise Untraceable("a factorization of many matrices, or of a large one")
     return [list(column) for column in array.T]
 
@@ -127,63 +121,6 @@ def pseudoinverse(graph: Graph, matrix: Tracer) -> Any:
     lines, across = list(zip(*inverse, strict=True)), list(zip(*q, strict=True))
     whole = traced(graph, [[_dot(line, row) for row in across] for line in lines])
     return whole.T if wide else whole
-
-
-# -- rotations -------------------------------------------------------------------------------------
-
-
-def _rotation(np_: Facade, p: Any, q: Any, both: Any) -> tuple[Any, Any, Any]:
-    """Return tangent, cosine and sine of the angle that makes (p, both; both, q) diagonal."""
-    nothing = both == 0.0
-    ratio = (q - p) / (2.0 * np_.where(nothing, 1.0, both))
-    tangent = np_.copysign(1.0, ratio) / (np_.abs(ratio) + np_.hypot(1.0, ratio))
-    tangent = np_.where(nothing, 0.0, tangent)
-    cosine = 1.0 / np_.hypot(1.0, tangent)
-    return tangent, cosine, tangent * cosine
-
-
-def symmetric_eigenvalues(graph: Graph, matrix: object) -> Tracer:
-    """Return the eigenvalues of a symmetric matrix in order; its lower half is read."""
-    np_, lower = Facade(graph), _columns(graph, matrix, _TURNED)
-    n = len(lower)
-    if len(lower[0]) != n:
-        raise Untraceable("a matrix that is not square")
-    a = {(i, j): lower[min(i, j)][max(i, j)] for i in range(n) for j in range(n)}
-    for _ in range(_SWEEPS):
-        for p, q in itertools.combinations(range(n), 2):
-            _diagonalized(np_, a, n, p, q)
-    apart = sum(np_.abs(a[p, q]) for p, q in itertools.combinations(range(n), 2))
-    _limited(graph, apart <= 1e-14 * sum(np_.abs(a[i, i]) for i in range(n)))
-    return sort(graph, traced(graph, [a[i, i] for i in range(n)]))
-
-
-def _diagonalized(np_: Facade, a: dict[tuple[int, int], Any], n: int, p: int, q: int) -> None:
-    tangent, cosine, sine = _rotation(np_, a[p, p], a[q, q], a[p, q])
-    moved = tangent * a[p, q]
-    a[p, p], a[q, q] = a[p, p] - moved, a[q, q] + moved
-    a[p, q] = a[q, p] = 0.0 * moved  # NaN stays
-    for k in (k for k in range(n) if k not in (p, q)):
-        one, other = a[k, p], a[k, q]
-        a[k, p] = a[p, k] = cosine * one - sine * other
-        a[k, q] = a[q, k] = sine * one + cosine * other
-
-
-def singular_values(graph: Graph, matrix: Arithmetic) -> Tracer:
-    """Return the singular values of a matrix, the largest first."""
-    array = traced(graph, matrix)
-    columns = _columns(graph, array if array.shape[0] >= array.shape[1] else array.T, _TURNED)
-    np_, pairs = Facade(graph), list(itertools.combinations(range(len(columns)), 2))
-    for _ in range(_SWEEPS):
-        for i, j in pairs:
-            a, b = columns[i], columns[j]
-            _, cosine, sine = _rotation(np_, _dot(a, a), _dot(b, b), _dot(a, b))
-            columns[i] = [cosine * v - sine * w for v, w in zip(a, b, strict=True)]
-            columns[j] = [sine * v + cosine * w for v, w in zip(a, b, strict=True)]
-    sizes = [np_.sqrt(_dot(c, c)) for c in columns]
-    largest = functools.reduce(np_.maximum, sizes)
-    for i, j in pairs:
-        _limited(graph, np_.abs(_dot(columns[i], columns[j])) <= 1e-14 * largest * largest)
-    return sort(graph, traced(graph, sizes))[::-1]
 
 
 def root_of_matrix(graph: Graph, a: object) -> Tracer:

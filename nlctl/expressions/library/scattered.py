@@ -37,7 +37,7 @@ def constants(value: object, what: str) -> np.ndarray:
 
 def _coordinates(graph: Graph, given: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...]]:
     """Return coordinates as columns, and the shape of the values."""
-    if len(given) == 1 and not isinstance(given[0], list | tuple):
+    if len(given) == 1 and not isinstance(given[0], tuple):
         points = traced(graph, given[0]).short()
         columns = [points[..., k] for k in range(points.shape[-1])]
         shape = points.shape[:-1] or (1,)  # of one point SciPy returns one value, in a row
