@@ -20,7 +20,7 @@ def with_bits(graph: Graph, name: str, a: Expr, b: Expr) -> Expr:
     if a.kind == b.kind == "b":
         return graph.op(name, a, b)
     if "f" in (a.kind, b.kind):
-        raise Untraceable("bits of what is no integer")
+        raise Untraceable("bits of what is not an integer")
     truth = a if a.kind == "b" else b if b.kind == "b" else None
     a, b = graph.integer(a), graph.integer(b)
     if a.value is not None and b.value is not None:
@@ -69,7 +69,7 @@ def _runs(mask: int) -> Iterator[tuple[int, int]]:
 def shifted(graph: Graph, number: Expr, places: int) -> Expr:
     """Return an integer with its bits moved to the left, or to the right where that is negative."""
     if number.kind == "f" or abs(places) > _BITS:
-        raise Untraceable("a shift of what is no integer, or by too many bits")
+        raise Untraceable("a shift of what is not an integer, or by too many bits")
     number = graph.integer(number)
     if places >= 0:
         return graph.op("mul", number, graph.const(1 << places))

@@ -83,7 +83,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["functions", "elimination", "linear_systems"],
         ["integers"],
         ["arrays", "operators", "masked", "indexing", "edges"],
-        ["sharp", "without_poles", "rounded"],
+        ["sharp", "without_poles", "decimals"],
         [
             "conditions",
             "continuity",

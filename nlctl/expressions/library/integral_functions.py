@@ -43,7 +43,7 @@ def _weighed(graph: Graph, weights: np.ndarray, values: Any) -> Any:
 def _order(graph: Graph, v: object) -> int:
     order = constant_value(traced(graph, v))
     if not isinstance(order, int | float) or order != int(order) or abs(order) > _ORDERS:
-        raise Untraceable("a Bessel function (jv, iv) whose order is no small integer")
+        raise Untraceable("a Bessel function (jv, iv) whose order is not a small integer")
     return int(order)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
-from .scattered import constants
+from .scattered import known_numbers
 from .table import enter
 
 __all__: list[str] = []
@@ -34,9 +34,9 @@ def enter_linear_maps() -> None:
 def _by_matrix(function: Callable[..., Any], place: int) -> Callable[..., Any]:
     def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
         what = f"options of {function.__name__}"
-        given = [v if k == place or v is None or isinstance(v, str) else constants(v, what)
+        given = [v if k == place or v is None or isinstance(v, str) else known_numbers(v, what)
                  for k, v in enumerate(arguments)]  # fmt: skip
-        named = {k: v if v is None or isinstance(v, str) else constants(v, what)[()]
+        named = {k: v if v is None or isinstance(v, str) else known_numbers(v, what)[()]
                  for k, v in options.items() if k != "axis"}  # fmt: skip
         if len(given) <= place:
             raise Untraceable(f"{function.__name__} with its data by name")

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
+from ..decimals import to_decimals
 from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, is_numpys
-from ..rounded import rounded
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
@@ -141,7 +141,7 @@ class Builtins:
             return written_out(self.graph, np.round, value, digits)
         if not value.is_pythons or not isinstance(digits, int) or not 0 <= digits <= _EXACT:
             raise Untraceable("round to decimals of what may be NumPy's number or Python's")
-        return python_number(self.graph, rounded(self.graph, value.only, digits))
+        return python_number(self.graph, to_decimals(self.graph, value.only, digits))
 
     def _len(self, value: Any) -> Any:
         chosen = isinstance(value, Masked | MaskedPlaces)

@@ -25,11 +25,11 @@ _MOST = 256  # triangles or points
 _INSIDE = -100 * float(np.finfo(float).eps)
 
 
-def constants(value: object, what: str) -> np.ndarray:
+def known_numbers(value: object, what: str) -> np.ndarray:
     """Return numbers that do not depend on the state."""
     known = constant_value(value) if isinstance(value, Tracer) else value
     if isinstance(known, list | tuple):
-        known = [constants(v, what) for v in known]
+        known = [known_numbers(v, what) for v in known]
     if isinstance(known, Tracer):
         raise Untraceable(f"{what} that depend on the state or on parameters")
     return np.asarray(known)
@@ -42,8 +42,8 @@ def _coordinates(graph: Graph, given: tuple[Any, ...]) -> tuple[list[Any], tuple
         columns = [points[..., k] for k in range(points.shape[-1])]
         shape = points.shape[:-1] or (1,)  # of one point SciPy returns one value, in a row
     else:
-        each = given[0] if len(given) == 1 else given
-        columns = [traced(graph, v).short() for v in each]
+        columns = given[0] if len(given) == 1 else given
+        columns = [traced(graph, v).short() for v in columns]
         shape = np.broadcast_shapes(*(c.shape for c in columns))
     zero = traced(graph, np.zeros(shape))
     return [elementwise(graph, "add", c, zero).reshape(-1) for c in columns], shape
@@ -56,7 +56,7 @@ def at_points(graph: Graph, given: tuple[Any, ...], function: Any) -> Any:
     return traced(graph, values).reshape(shape) if shape else values[0]
 
 
-def linear(graph: Graph, table: Any, *given: Any, **options: object) -> Any:
+def between_corners(graph: Graph, table: Any, *given: Any, **options: object) -> Any:
     """Return SciPy's linear interpolation between the corners of triangles."""
     corners = table.tri.simplices
     values = np.asarray(table.values)
@@ -100,7 +100,7 @@ def _deepest(graph: Graph, depth: Tracer, values: Tracer) -> tuple[Tracer, Any]:
     return scalar(graph, best[1]), scalar(graph, best[0])
 
 
-def nearest(graph: Graph, table: Any, *given: Any, **options: object) -> Any:
+def at_the_nearest(graph: Graph, table: Any, *given: Any, **options: object) -> Any:
     """Return the value of the nearest point; between two that are equally near it is called."""
     points, values = np.asarray(table.points, dtype=float), np.asarray(table.values, dtype=float)
     if options or getattr(table, "scale", None) is not None or values.ndim != 1:
@@ -135,15 +135,15 @@ def on_scattered(
     """Return SciPy's `griddata`."""
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-    places = constants(points, "points of a table")
+    places = known_numbers(points, "points of a table")
     places = places.T if isinstance(points, tuple) else places
-    known, several = constants(values, "values of a table"), isinstance(xi, tuple)
+    known, several = known_numbers(values, "values of a table"), isinstance(xi, tuple)
     if rescale or method not in ("linear", "nearest") or places.ndim != 2:
         raise Untraceable(f"scipy.interpolate.griddata of method {method!r}, or in one dimension")
     given = tuple(xi) if several else (xi,)
     if method == "nearest":
-        return nearest(graph, NearestNDInterpolator(places, known), *given)
-    return linear(graph, LinearNDInterpolator(places, known, fill_value), *given)
+        return at_the_nearest(graph, NearestNDInterpolator(places, known), *given)
+    return between_corners(graph, LinearNDInterpolator(places, known, fill_value), *given)
 
 
 def radial(graph: Graph, table: Any, x: object) -> Any:

@@ -47,19 +47,7 @@ def enter_scipy() -> None:
     enter([linalg.solve_triangular], of_triangle)
     enter([linalg.solve_banded], of_bands)
     enter([linalg.expm], expm)
-    for name in ("toeplitz", "circulant", "hankel", "companion"):
-        enter([getattr(linalg, name)], by_numpy(getattr(linalg, name)))
-    enter([linalg.qr], scipys_qr)
-    enter([linalg.pinv], lambda graph, a: pinv(graph, a, None))
-    enter([linalg.svdvals], lambda graph, a: svd(graph, a, compute_uv=False))
-    enter(
-        [linalg.eigvalsh],
-        lambda graph, a, lower=True: eigvalsh(graph, a, "U" if not lower else "L"),
-    )
-    enter([linalg.eigh], _scipys_eigh)
-    enter([linalg.sqrtm], root_of_matrix)
-    enter([linalg.solve_continuous_lyapunov, linalg.solve_lyapunov], lyapunov)
-    enter([linalg.solve_discrete_lyapunov], lambda graph, a, q: lyapunov(graph, a, q, True))
+    _enter_matrices(linalg)
     for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size)):
         formula(getattr(special, name))(of_gamma)
     enter([linalg.cho_factor], cholesky_factor)
@@ -74,6 +62,23 @@ def enter_scipy() -> None:
     for name in ("log1p", "expm1", "exp2", "cbrt"):
         if getattr(special, name) is not getattr(np, name):
             enter([getattr(special, name)], functools.partial(_elementwise, name))
+
+
+def _enter_matrices(linalg: Any) -> None:
+    """Enter factorizations, and matrices that are made of rows."""
+    for name in ("toeplitz", "circulant", "hankel", "companion"):
+        enter([getattr(linalg, name)], by_numpy(getattr(linalg, name)))
+    enter([linalg.qr], scipys_qr)
+    enter([linalg.pinv], _scipys_pinv)
+    enter([linalg.svdvals], lambda graph, a: svd(graph, a, compute_uv=False))
+    enter(
+        [linalg.eigvalsh],
+        lambda graph, a, lower=True: eigvalsh(graph, a, "U" if not lower else "L"),
+    )
+    enter([linalg.eigh], _scipys_eigh)
+    enter([linalg.sqrtm], root_of_matrix)
+    enter([linalg.solve_continuous_lyapunov, linalg.solve_lyapunov], lyapunov)
+    enter([linalg.solve_discrete_lyapunov], lambda graph, a, q: lyapunov(graph, a, q, True))
 
 
 def _enter_integrals(special: Any) -> None:
@@ -121,6 +126,11 @@ def _distances(np: Facade, one: object, other: object) -> Any:
     a, b = traced(np.graph, one), traced(np.graph, other)
     apart = a[:, None, :] - b[None, :, :]
     return np.sqrt(np.sum(apart * apart, axis=-1))
+
+
+def _scipys_pinv(graph: Graph, a: object) -> Any:
+    size = max(traced(graph, a).shape)
+    return pinv(graph, a, size * float(np.finfo(float).eps))
 
 
 def _scipys_eigh(graph: Graph, a: object, *, lower: bool = True, eigvals_only: bool = False) -> Any:

@@ -123,7 +123,7 @@ def eigh(graph: Graph, a: object, UPLO: str = "L") -> Any:
 
 
 @of(np.roots)
-def roots(graph: Graph, p: object) -> Any:
+def roots_of_polynomial(graph: Graph, p: object) -> Any:
     """Return the roots of a polynomial up to the second degree, in the order of NumPy's."""
     numbers = traced(graph, p).short()
     if numbers.ndim != 1:

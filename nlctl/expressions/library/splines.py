@@ -39,8 +39,8 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.UnivariateSpline, fitted_spline),
         (interpolate.BivariateSpline, surface),
         (interpolate.RegularGridInterpolator, _grid),
-        (interpolate.LinearNDInterpolator, scattered.linear),
-        (interpolate.NearestNDInterpolator, scattered.nearest),
+        (interpolate.LinearNDInterpolator, scattered.between_corners),
+        (interpolate.NearestNDInterpolator, scattered.at_the_nearest),
         (interpolate.RBFInterpolator, scattered.radial),
         (
             (interpolate.KroghInterpolator, interpolate.BarycentricInterpolator),

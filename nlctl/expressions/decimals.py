@@ -12,7 +12,7 @@ _SPLITTER = 2.0**27 + 1.0
 _WHOLE = 2.0**52  # from here on floats are integers
 
 
-def rounded(graph: Graph, x: Expr, digits: int) -> Expr:
+def to_decimals(graph: Graph, x: Expr, digits: int) -> Expr:
     """Return x with so many decimals, of two that are equally far the even one."""
     op, const = graph.op, graph.const
     ten = const(10.0**digits)
