@@ -304,7 +304,7 @@ class Stage:
                 return self._traced_library(real, written, arguments, options)
             try:
                 return self.fresh(real(*every, **named))
-            except (Untraceable, TypeError) as error:  # it has called a function of the user's
+            except Exception as error:  # it has called a function of the user's, as `fsolve` does
                 if any(map(callable, every)):
                     raise Untraceable(f"{_title(real)} is not known here") from error
                 raise
