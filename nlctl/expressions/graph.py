@@ -481,6 +481,9 @@ class Graph:
         if len(pieces) == 1:
             return pieces[0][0]
         args, lengths = zip(*((self.number(e), n) for e, n in pieces), strict=True)
+        if all(e.op in ("const", "table") for e in args):
+            parts = (np.broadcast_to(e.data, n) for e, n in zip(args, lengths, strict=True))
+            return self.table(list(np.concatenate(list(parts))))
         return self.node("concat", *args, data=lengths, size=sum(lengths))
 
     def table(self, values: Sequence[float]) -> Expr:

@@ -25,6 +25,7 @@ from .arrays import (
     traced,
 )
 from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable, needed
+from .integers import shifted, with_bits
 
 _Range = tuple[float, float]
 _EVERYTHING = (-math.inf, math.inf)
@@ -122,7 +123,7 @@ def with_counts(array: Tracer) -> Tracer:
     """Return an array with 0 and 1 for truth values, as NumPy's sums take them."""
     if all(e.kind != "b" for e in array.values.flat):
         return array
-    return Tracer(array.graph, mapped(array.graph.integer, array.cells), array.axis, array.length)
+    return mapped_cells(array, array.graph.integer)
 
 
 def total(array: Tracer, axis: Any = None) -> Tracer:
@@ -187,6 +188,8 @@ def _truth(self: Tracer) -> bool:
 
 def _invert(self: Tracer) -> Tracer:
     """Return the negation of NumPy's truth values; of Python's own ~True is -2."""
+    if all(e.kind == "i" for e in self.cells.flat):
+        return _as_their_result(elementwise(self.graph, "sub", -1, self), [self])
     if any(e.kind != "b" for e in self.cells.flat):
         raise Untraceable("~ of numbers")
     if not all(map(is_of_arrays, self.cells.flat)):
@@ -242,8 +245,9 @@ def _floor_division_by(self: Tracer, other: object) -> Any:
 def floor_quotient(graph: Graph, a: object, b: object) -> Tracer:
     """Return NumPy's floor_divide of floats, which starts from the exact remainder."""
     both = [traced(graph, v) for v in (a, b)]
-    if all(e.kind == "i" for array in both for e in array.values.flat):
-        raise Untraceable("floor division of integers that depend on the state")
+    are_integers = all(e.kind == "i" for array in both for e in array.values.flat)
+    if are_integers and not all(e.op == "const" and e.data for e in both[1].values.flat):
+        raise Untraceable("floor division by an integer that depends on the state")
     op = functools.partial(elementwise, graph)
     rest = op("fmod", a, b)
     quotient = op("div", op("sub", a, rest), b)
@@ -254,7 +258,40 @@ def floor_quotient(graph: Graph, a: object, b: object) -> Tracer:
     whole = op("floor", quotient)
     up = op("gt", op("sub", quotient, whole), 0.5)
     whole = op("select", up, op("add", whole, 1.0), whole)
+    if are_integers:
+        return mapped_cells(whole, graph.integer)
     return op("select", op("eq", b, 0.0), op("div", a, b), whole)
+
+
+def mapped_cells(array: Tracer, function: Callable[[Expr], Expr]) -> Tracer:
+    """Return an array of what a function makes of each expression."""
+    return Tracer(array.graph, mapped(function, array.cells), array.axis, array.length)
+
+
+def bits(graph: Graph, name: str, *operands: object) -> Tracer:
+    """Return ``&``, ``|`` or ``^``, element by element: of truth values, or bits of integers."""
+    a, b = (traced(graph, v) for v in operands)
+    if all(e.kind == "b" for array in (a, b) for e in array.values.flat):
+        return elementwise(graph, name, a, b)
+    cells = np.broadcast_arrays(a.elements(), b.elements())
+    return Tracer(graph, mapped(lambda p, q: with_bits(graph, name, _one_bit(graph, p), q), *cells))
+
+
+def _one_bit(graph: Graph, number: Expr) -> Expr:
+    """Return an integer that is 0 or 1 as a truth value."""
+    is_bit = number.kind == "i" and number.value is None and integer_range(number) == (0.0, 1.0)
+    return graph.truth(number) if is_bit else number
+
+
+def moved_bits(graph: Graph, number: object, places: object, way: int) -> Tracer:
+    """Return integers with their bits moved, to the left where `way` is 1; how far is known."""
+    array, by = traced(graph, number), traced(graph, places)
+    if by.shape or by.only.kind != "i":
+        raise Untraceable("a shift by something else than one integer")
+    count = _integer(by)
+    if count < 0:
+        raise ValueError("negative shift count")
+    return mapped_cells(array, lambda e: shifted(graph, e, way * count))
 
 
 def _is_integer(value: object) -> bool:
@@ -273,14 +310,14 @@ def _power(base: Any, exponent: Any) -> Any:
         return elementwise(exponent.graph, "power", base, exponent)
     if not isinstance(base, Tracer):
         return base**exponent
-    if base.graph.attempts and not _is_numpys(base.graph, base):
+    if base.graph.attempts and not is_numpys(base.graph, base):
         raise Untraceable("try around a power of what may be Python's own numbers")
     if isinstance(exponent, int | np.integer) and abs(exponent) <= 64:
-        cells = mapped(lambda e: base.graph.power(e, int(exponent)), base.cells)
-        return Tracer(base.graph, cells, base.axis, base.length)
+        return mapped_cells(base, lambda e: base.graph.power(e, int(exponent)))
     return elementwise(base.graph, "power", base, exponent)
 
 
+_OF_BITS: dict[str, Callable[..., Any]] = dict.fromkeys(("and", "or", "xor"), bits)
 _OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
 
 
@@ -294,7 +331,7 @@ def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
         operands = (other, self) if swapped else (self, other)
         if name in ("div", "remainder") and self.graph.attempts:
             _ask_divisor(self.graph, *operands)
-        result = elementwise(self.graph, name, *operands)
+        result = _OF_BITS.get(name, elementwise)(self.graph, name, *operands)
         return _as_their_result(result, operands)
 
     return method
@@ -320,11 +357,11 @@ def _ask_divisor(graph: Graph, a: object, b: object) -> None:
         return  # formulas of functions of NumPy divide as NumPy does
     if _is_pythons(a) and _is_pythons(b):
         graph.guard(elementwise(graph, "ne", b, 0.0).only, ZeroDivisionError)
-    elif not (_is_numpys(graph, a) or _is_numpys(graph, b)):
+    elif not (is_numpys(graph, a) or is_numpys(graph, b)):
         raise Untraceable("try around a division of what may be Python's own numbers")
 
 
-def _is_numpys(graph: Graph, value: object) -> bool:
+def is_numpys(graph: Graph, value: object) -> bool:
     """Whether a number is known to be one of NumPy's: it is made of states or inputs."""
     if not isinstance(value, Tracer) or value.shape:
         return isinstance(value, Tracer | np.ndarray | np.generic)
@@ -353,11 +390,19 @@ def _in_place(name: str) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
         if not self.shape:
             return _operator(name)(self, other)  # a number is not changed but replaced
-        result = elementwise(self.graph, name, self, other)
+        result = _OF_BITS.get(name, elementwise)(self.graph, name, self, other)
         if result.shape != self.shape:
             raise Untraceable("assignment of another shape")
         self[...] = result
         return self
+
+    return method
+
+
+def _shift(way: int, swapped: bool) -> Callable[[Tracer, object], Any]:
+    def method(self: Tracer, other: object) -> Any:
+        operands = (other, self) if swapped else (self, other)
+        return _as_their_result(moved_bits(self.graph, *operands, way), operands)
 
     return method
 
@@ -385,6 +430,11 @@ for _name, _method in {
     "divmod": lambda self, other: (self // other, self % other),
     "rdivmod": lambda self, other: (other // self, other % self),
     "pos": lambda self: self,
+    **{
+        f"{back}{name}shift": _shift(way, bool(back))
+        for name, way in (("l", 1), ("r", -1))
+        for back in ("", "r")
+    },
     "matmul": lambda self, other: _matrix_product(self.graph, self, other),
     "rmatmul": lambda self, other: _matrix_product(self.graph, other, self),
 }.items():

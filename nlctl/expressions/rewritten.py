@@ -55,17 +55,22 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
     return _compiled(body, function.__code__)
 
 
+_FOLLOWED = "followed_function"
+
+
 def _compiled(node: Definition, code: CodeType) -> CodeType:
     """Return the code of a definition whose free variables are those of another code."""
     outer = ast.parse(f"def outer({', '.join(code.co_freevars)}): pass").body[0]
     assert isinstance(outer, ast.FunctionDef)
-    outer.body = [node]  # type: ignore[list-item]
+    assert isinstance(node, ast.FunctionDef)
+    node.name = _FOLLOWED  # its own name is that of a global one, where it calls itself
+    outer.body = [node]
     module = ast.fix_missing_locations(ast.Module([outer], []))
     whole = compile(module, code.co_filename, "exec", dont_inherit=True)
-    inside = _inside(_inside(whole, "outer"), code.co_name)
+    inside = _inside(_inside(whole, "outer"), _FOLLOWED)
     if inside.co_freevars != code.co_freevars:
         raise Untraceable("variables of the function around it that are not read")
-    return inside
+    return inside.replace(co_name=code.co_name, co_qualname=code.co_qualname)
 
 
 def _inside(code: CodeType, name: str) -> CodeType:

@@ -17,7 +17,7 @@ import inspect
 import logging
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -30,6 +30,7 @@ from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
+from .library.linear_maps import enter_linear_maps
 from .library.python import NUMBER_SAMPLES, Builtins, of_math
 from .library.roots import roots
 from .library.rotations import enter_rotations, turn_of
@@ -43,6 +44,7 @@ from .source import codes_in, is_dispatcher
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice, Fraction)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
 _OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
+_ITERATING = ("math", "statistics", "heapq")  # what takes generators as it takes lists
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
 _OF_TUPLES = frozenset(vars(collections.namedtuple("_Tuple", ())))  # what Python makes of one
 _LARGE = 65536  # elements of an array that stays as it is
@@ -165,6 +167,8 @@ class Stage:
             enter_scipy()
         if module.startswith("scipy.interpolate"):
             enter_splines()
+        if module.startswith(("scipy.integrate", "scipy.signal", "scipy.ndimage")):
+            enter_linear_maps()
         try:
             return value in WRITTEN
         except TypeError:  # it has no hash
@@ -188,8 +192,8 @@ class Stage:
         if is_dispatcher(value):
             return functools.partial(self._dispatched, value)
         if isinstance(value, CPUDispatcher | FunctionType):
-            if value is dataclasses.dataclass:  # it looks at types and defaults alone
-                return value
+            if value in (dataclasses.dataclass, collections.namedtuple):
+                return value  # they look at types, defaults and names alone
             if staged.is_of_a_library(value):
                 return self._library("", value)
             return self.copied(value)
@@ -251,6 +255,8 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
+        if (type(real).__name__, "pdf") in WRITTEN:  # a law of probability
+            return self._instead_of_object(real)
         if (getattr(real, "__module__", None) or "").startswith("scipy.optimize"):
             search = roots().get(real)
             return self.for_numbers(real) if search is None else self.copied(search)
@@ -265,9 +271,12 @@ class Stage:
     def _written(self, real: Any) -> Callable[..., Any]:
         """Return a function of the table."""
         written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
-        folds = (getattr(real, "__module__", None) or "").startswith(_OF_MATRICES)
+        module = getattr(real, "__module__", None) or ""
+        folds, iterates = module.startswith(_OF_MATRICES), module in _ITERATING
 
         def function(*arguments: object, **options: object) -> Any:
+            if iterates:
+                arguments = tuple(list(v) if isinstance(v, Iterator) else v for v in arguments)
             given = [*staged.settled(arguments), *map(staged.settled, options.values())]
             if folds and not staged.holds_tracers(given):
                 return of_numbers(*arguments, **options)
@@ -295,7 +304,7 @@ class Stage:
                 return self._traced_library(real, written, arguments, options)
             try:
                 return self.fresh(real(*every, **named))
-            except (Untraceable, TypeError) as error:  # it has called a function of the user's
+            except Exception as error:  # it has called a function of the user's, as `fsolve` does
                 if any(map(callable, every)):
                     raise Untraceable(f"{_title(real)} is not known here") from error
                 raise
@@ -333,7 +342,7 @@ class Stage:
             if not staged.holds_tracers(arguments):
                 return of_numbers(*arguments)
             if len(arguments) != count:
-                raise Untraceable(f"{operation} with other arguments")
+                return self._of_more(operation, function, arguments)
             if operation == "power":
                 result = traced(self.graph, arguments[0]) ** arguments[1]
             else:
@@ -341,6 +350,14 @@ class Stage:
             return of_math(self.graph, operation, result, arguments)
 
         return function
+
+    def _of_more(self, operation: str, one: Any, arguments: tuple[Any, ...]) -> Any:
+        """Return a function of math of more arguments than NumPy's takes."""
+        if operation == "log" and len(arguments) == 2:  # to a base
+            return one(arguments[0]) / one(arguments[1])
+        if operation == "hypot" and len(arguments) > 2:
+            return functools.reduce(one, arguments)
+        raise Untraceable(f"{operation} with other arguments")
 
     def _of_python(self, function: object) -> Any:
         """Return a function of math whose results are numbers of Python's own."""

@@ -154,6 +154,9 @@ class StagedObject:
             return functools.partial(self, grid=False)
         if name in _PLACES and is_of_a_library(real):
             return StagedObject(getattr(real, name), stage)
+        written = WRITTEN.get((type(real).__name__, name)) if is_of_a_library(real) else None
+        if written is not None:
+            return functools.partial(written, stage.graph)
         if is_of_a_library(real) and callable(getattr(real, name)):
             return stage.for_numbers(getattr(real, name))
         return stage.instead(getattr(real, name))

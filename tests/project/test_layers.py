@@ -81,8 +81,9 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["signs"],
         ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
+        ["integers"],
         ["arrays", "operators", "masked", "indexing", "edges"],
-        ["sharp", "without_poles"],
+        ["sharp", "without_poles", "decimals"],
         [
             "conditions",
             "continuity",

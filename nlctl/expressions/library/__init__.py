@@ -6,8 +6,10 @@ What NumPy computes by moving elements, adding and multiplying, it computes itse
 
 from . import (
     complex_numbers,
+    counted,
     creation,
     elementary,
+    laws,
     linear_algebra,
     python,
     reductions,
@@ -22,8 +24,10 @@ from . import (
 
 __all__ = [
     "complex_numbers",
+    "counted",
     "creation",
     "elementary",
+    "laws",
     "linear_algebra",
     "python",
     "reductions",

@@ -82,6 +82,8 @@ def array(graph: Graph, values: Any, dtype: Any = None, copy: bool = True, ndmin
         return traced(graph, result)
     if holds_complex(values):
         return paired(graph, values)
+    if dtype in (int, np.int64, "int") and not ndmin:
+        return whole_numbers(graph, traced(graph, values)).copy()
     only_floats(dtype)
     result = _of_floats(graph, traced(graph, values)).copy()
     if dtype is None and len({e.kind for e in result.values.flat}) > 1:

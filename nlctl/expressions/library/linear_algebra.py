@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arithmetic import Arithmetic
-from ..arrays import Tracer, as_array, scalar, traced
+from ..arrays import Special, Tracer, as_array, scalar, traced
 from ..elimination import eliminated, is_zero, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
@@ -209,18 +209,6 @@ def _solved_pairs(graph: Graph, a: object, b: object) -> ComplexPair:
     return ComplexPair(graph, solution[: len(right)], solution[len(right) :])
 
 
-@of(np.linalg.svd)
-def svd(graph: Graph, a: object, full_matrices: bool = True, compute_uv: bool = True) -> Tracer:
-    """Return the singular values of a matrix of two rows and columns, the larger one first."""
-    rows = _square(graph, a)
-    if compute_uv or len(rows) != 2:
-        raise Untraceable("singular vectors, or values of a matrix of more than two rows")
-    (p, q), (r, s) = rows
-    half, np_ = 0.5, Facade(graph)
-    one, other = np_.hypot(p + s, r - q) * half, np_.hypot(p - s, r + q) * half
-    return traced(graph, [one + other, np_.abs(one - other)])
-
-
 def of_bands(
     graph: Graph, l_and_u: tuple[int, int], ab: object, b: object, **how: object
 ) -> Tracer:
@@ -290,13 +278,27 @@ def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:
     return any_is_zero
 
 
-class _NotComputed:
+class NotComputed(Special):
     """What a function returns besides, of which nothing can be asked."""
 
+    __array_ufunc__ = None
+
+    def __init__(self, what: str) -> None:
+        self.__dict__["what"] = what
+
+    def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Any:
+        """Refuse it."""
+        raise Untraceable(self.__dict__["what"])
+
     def _asked(self, *_: Any) -> Any:
-        raise Untraceable("rank, residuals or singular values of a matrix that the state decides")
+        raise Untraceable(self.__dict__["what"])
 
     __getattr__ = __bool__ = __eq__ = __hash__ = __len__ = __iter__ = __getitem__ = _asked
+    __add__ = __sub__ = __mul__ = __matmul__ = __truediv__ = __neg__ = _asked
+    __radd__ = __rsub__ = __rmul__ = __rmatmul__ = __rtruediv__ = _asked
+
+
+_REST = "rank, residuals or singular values of a matrix that the state decides"
 
 
 @of(np.linalg.lstsq)
@@ -306,7 +308,7 @@ def lstsq(graph: Graph, a: object, b: object, rcond: Any = None) -> tuple[Any, .
     if not isinstance(matrix, np.ndarray):
         rcond = np.finfo(float).eps * max(matrix.shape) if rcond is None else rcond
         inverse = WRITTEN[np.linalg.pinv](graph, matrix, rcond)
-        return product(inverse, traced(graph, b)), *[_NotComputed()] * 3
+        return product(inverse, traced(graph, b)), *[NotComputed(_REST)] * 3
     b = traced(graph, b)
     solution = product(traced(graph, np.linalg.pinv(matrix)), b)
     singular = np.linalg.svd(matrix, compute_uv=False)
@@ -339,28 +341,3 @@ def cholesky(graph: Graph, a: object) -> Tracer:
                 rest = rest - lower[i][k] * lower[j][k]
             lower[i][j] = rest / lower[j][j]
     return traced(graph, lower)
-
-
-@of(np.linalg.cond)
-def cond(graph: Graph, x: Any, p: Any = None) -> Any:
-    """Return the condition number of a matrix of two rows: the ratio of its singular values."""
-    rows, np_ = _square(graph, x), Facade(graph)
-    if len(rows) != 2 or p not in (None, 2):
-        raise Untraceable("the condition number of a matrix of more than two rows")
-    (a, b), (c, d) = rows
-    largest = 0.5 * (np_.hypot(a + d, b - c) + np_.hypot(a - d, b + c))
-    smallest = np_.abs(a * d - b * c) / largest
-    return np_.where(largest == 0.0, np.inf, largest / smallest)
-
-
-@of(np.linalg.eigvalsh)
-def eigvalsh(graph: Graph, a: object) -> Tracer:
-    """Return the eigenvalues of a symmetric matrix of two rows; NumPy reads the lower half."""
-    rows, np_ = _square(graph, a), Facade(graph)
-    if len(rows) == 1:
-        return traced(graph, [rows[0][0]])
-    if len(rows) != 2:
-        raise Untraceable("eigenvalues of a matrix of more than two rows")
-    (p, _), (q, r) = rows
-    middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
-    return traced(graph, [middle - spread, middle + spread])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import copy
 import functools
+import heapq
 import math
 import sys
 from collections.abc import Callable
@@ -14,14 +15,16 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
+from ..decimals import to_decimals
 from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
-from ..operators import elementwise, is_of_arrays
+from ..operators import elementwise, is_numpys
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
+_EXACT = 22  # the largest power of ten that is a float
 # of a kind of numbers: those of Python and of NumPy
 NUMBER_SAMPLES = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
 # these ask their arguments, as they do of arrays
@@ -81,7 +84,7 @@ class Builtins:
         """Return all of them by name."""
         names = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
         names.update(__import__=import_, super=self._super, print=self._print)
-        for name in ("len", "round", "isinstance", "getattr", "hasattr", "type"):
+        for name in ("len", "round", "isinstance", "getattr", "hasattr", "type", "vars"):
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
         names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
@@ -134,9 +137,11 @@ class Builtins:
             raise Untraceable("round of something else than a float")
         if digits is None:
             return self._whole("rint", value)
-        if not is_of_arrays(value.only):
-            raise Untraceable("Python's round to decimals, of one of its own floats")
-        return written_out(self.graph, np.round, value, digits)
+        if is_numpys(self.graph, value):
+            return written_out(self.graph, np.round, value, digits)
+        if not value.is_pythons or not isinstance(digits, int) or not 0 <= digits <= _EXACT:
+            raise Untraceable("round to decimals of what may be NumPy's number or Python's")
+        return python_number(self.graph, to_decimals(self.graph, value.only, digits))
 
     def _len(self, value: Any) -> Any:
         chosen = isinstance(value, Masked | MaskedPlaces)
@@ -168,6 +173,11 @@ class Builtins:
     def _getattr(self, thing: object, *rest: Any) -> Any:
         return getattr(thing, *rest)
 
+    def _vars(self, thing: Any) -> Any:
+        if not hasattr(type(thing), "_forwards"):
+            return vars(thing)
+        return {k: self.stage.instead(v) for k, v in vars(thing.__dict__["_real"]).items()}
+
     def _hasattr(self, thing: object, name: str) -> bool:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
@@ -197,6 +207,8 @@ class Builtins:
         """Python's min and max: the first of those that no other is beyond."""
         values = list(values[0]) if len(values) == 1 else list(values)  # type: ignore[assignment]
         key = options.pop("key", None)
+        if values:
+            options.pop("default", None)
         keys = [v if key is None else key(v) for v in values]
         if not any(map(is_traced, (*values, *keys))):
             return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)
@@ -228,6 +240,17 @@ def copied(graph: Graph, value: Any, memo: object = None) -> Any:
     if type(value) is dict:
         return {k: copied(graph, v) for k, v in value.items()}
     raise Untraceable(f"a copy of {type(value).__name__}")
+
+
+def _first_ones(reverse: bool) -> Callable[..., Any]:
+    def written(_: Graph, n: int, iterable: Any, key: Any = None) -> Any:
+        return sorted(iterable, key=key, reverse=reverse)[:n]
+
+    return written
+
+
+of(heapq.nlargest)(_first_ones(True))
+of(heapq.nsmallest)(_first_ones(False))
 
 
 @of(np.vectorize)

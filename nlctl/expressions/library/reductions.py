@@ -15,7 +15,7 @@ from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
 from ..operators import elementwise, total, with_counts
 from .complex_numbers import ComplexPair
-from .table import ARRAY_METHODS, Facade, constant_value, formula, of
+from .table import ARRAY_METHODS, WRITTEN, Facade, constant_value, formula, of
 
 __all__: list[str] = []
 
@@ -131,8 +131,16 @@ def _count(array: Tracer, axis: Axis) -> float:
 
 
 @of(np.mean)
-def mean(graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False) -> Any:
+def mean(
+    graph: Graph, values: object, axis: Axis = None, *, keepdims: bool = False,
+    where: object = True,
+) -> Any:  # fmt: skip
     """Return a mean."""
+    if where is not True:
+        chosen = elementwise(graph, "select", where, 1.0, elementwise(graph, "mul", values, 0.0))
+        chosen = elementwise(graph, "ne", where, 0.0) if traced(graph, where).shape else chosen
+        parts = sum_along(graph, values, axis, keepdims=keepdims, where=where)
+        return elementwise(graph, "div", parts, sum_along(graph, chosen, axis, keepdims=keepdims))
     if isinstance(values, Masked):
         return values.mean()
     if isinstance(values, ComplexPair):
@@ -268,13 +276,13 @@ def _along(graph: Graph, values: object, axis: Any, function: Callable[..., list
 
 
 @of(np.sort)
-def sort(graph: Graph, values: object, axis: object = -1) -> Tracer:
+def sort(graph: Graph, values: object, axis: object = -1, **_how: object) -> Tracer:
     """Return an array in order."""
     return _along(graph, values, axis, lambda row: in_order(graph, row)[0])
 
 
 @of(np.argsort)
-def argsort(graph: Graph, values: object, axis: object = -1) -> Tracer:
+def argsort(graph: Graph, values: object, axis: object = -1, **_how: object) -> Tracer:
     """Return where the elements of an ordered array were."""
     # Equal ones stay in their order; NumPy's own depends on the machine there.
     if traced(graph, values).shape[-1] > 16:
@@ -345,9 +353,12 @@ def corrcoef(np: Facade, x: object, y: object = None) -> Tracer:
     return np.clip(correlations, -1.0, 1.0)
 
 
-def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:
+def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1, **_how: object) -> None:
     """Put an array in order."""
     values[...] = sort(graph, values, axis)
+
+
+_SINGULAR = np.linalg.svd
 
 
 @formula(np.linalg.norm)
@@ -365,6 +376,9 @@ def norm(
         return (np.max if ord > 0 else np.min)(size, axis=axis, keepdims=keepdims)
     if ord == 1 and x.ndim != 2:
         return np.sum(size, axis=axis, keepdims=keepdims)
+    if x.ndim == 2 and axis is None and ord in (2, -2, "nuc"):
+        values = WRITTEN[_SINGULAR](np.graph, x, compute_uv=False)
+        return np.sum(values) if ord == "nuc" else values[0 if ord == 2 else -1]
     is_euclidean = ord is None or ord == "fro" or (ord == 2 and (x.ndim == 1 or axis is not None))
     if not is_euclidean:
         raise Untraceable(f"the norm {ord!r} of this array")

@@ -24,7 +24,8 @@ _MOVING = (
     np.fliplr, np.flipud, np.rot90, np.diagonal, np.diag, np.diagflat, np.broadcast_to,
     np.broadcast_arrays, np.stack, np.vstack, np.column_stack, np.dstack, np.tile,
     np.repeat, np.insert, np.delete, np.tril, np.triu, np.resize,
-    np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
+    np.meshgrid, np.take_along_axis, np.compress, np.ix_, np.matrix_transpose,
+    np.lib.stride_tricks.sliding_window_view,
 )  # fmt: skip
 # functions that add and multiply
 _COMPUTING = (
@@ -32,7 +33,7 @@ _COMPUTING = (
     np.inner, np.vdot, np.tensordot, np.linalg.multi_dot, np.linalg.matrix_power, np.cumsum,
     np.cumprod, np.trapezoid, np.polyval, np.vander, np.polyder, np.polyadd, np.polymul,
     np.polysub, np.ediff1d, np.linalg.cross, np.linalg.outer, np.linalg.trace,
-    np.linalg.vecdot, np.linalg.tensordot,
+    np.linalg.vecdot, np.linalg.tensordot, np.cumulative_sum, np.cumulative_prod,
 )  # fmt: skip
 
 
@@ -168,12 +169,26 @@ def gradient(graph: Graph, f: object, *spacing: object) -> Tracer:
     """Return central differences, one-sided ones at the ends."""
     array = traced(graph, f)
     h = traced(graph, spacing[0] if spacing else 1.0)
-    if array.ndim != 1 or len(spacing) > 1 or h.shape:
-        raise Untraceable("a gradient along several axes, or on an uneven grid")
+    if array.ndim != 1 or len(spacing) > 1:
+        raise Untraceable("a gradient along several axes")
+    if h.shape:
+        return _uneven_gradient(graph, array, h)
     inner = (array[2:] - array[:-2]) / (2.0 * h)
     first = (array[1:2] - array[:1]) / h
     last = (array[-1:] - array[-2:-1]) / h
     return concatenated(graph, [first, inner, last])
+
+
+def _uneven_gradient(graph: Graph, array: Tracer, places: Tracer) -> Tracer:
+    """Return the slopes of parabolas through three points, of lines at the ends."""
+    h, rise = places[1:] - places[:-1], array[1:] - array[:-1]
+    before, after = h[:-1], h[1:]
+    inner = (
+        -(after / (before * (before + after))) * array[:-2]
+        + (after - before) / (before * after) * array[1:-1]
+        + before / (after * (before + after)) * array[2:]
+    )
+    return concatenated(graph, [rise[:1] / h[:1], inner, rise[-1:] / h[-1:]])
 
 
 @of(np.roll)

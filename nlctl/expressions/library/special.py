@@ -12,15 +12,20 @@ from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
+from . import integral_functions
+from .cells import by_numpy
 from .complex_numbers import ComplexPair
 from .creation import whole_numbers
 from .exponential import expm
 from .gamma import gamma, loggamma_of_size
+from .integral_functions import bessel, exponential_integral, macdonald, modified_bessel
 from .integrals import fixed_quad, quad
 from .linear_algebra import cholesky_factor, of_bands, of_cholesky, of_triangle, of_triangles
+from .orthogonal import lyapunov, root_of_matrix, scipys_qr
 from .python import guard_whole
 from .reductions import prod, sum_along
 from .shapes import by_moving
+from .spectra import eigh, eigvalsh, pinv, svd
 from .table import WRITTEN, Facade, enter, formula, of
 
 
@@ -42,9 +47,11 @@ def enter_scipy() -> None:
     enter([linalg.solve_triangular], of_triangle)
     enter([linalg.solve_banded], of_bands)
     enter([linalg.expm], expm)
+    _enter_matrices(linalg)
     for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size)):
         formula(getattr(special, name))(of_gamma)
     enter([linalg.cho_factor], cholesky_factor)
+    _enter_integrals(special)
     for name, formula_of in _FORMULAS.items():
         formula(getattr(special, name))(formula_of)
     of(integrate.quad, makes=True)(quad)
@@ -55,6 +62,37 @@ def enter_scipy() -> None:
     for name in ("log1p", "expm1", "exp2", "cbrt"):
         if getattr(special, name) is not getattr(np, name):
             enter([getattr(special, name)], functools.partial(_elementwise, name))
+
+
+def _enter_matrices(linalg: Any) -> None:
+    """Enter factorizations, and matrices that are made of rows."""
+    for name in ("toeplitz", "circulant", "hankel", "companion"):
+        enter([getattr(linalg, name)], by_numpy(getattr(linalg, name)))
+    enter([linalg.qr], scipys_qr)
+    enter([linalg.pinv], _scipys_pinv)
+    enter([linalg.svdvals], lambda graph, a: svd(graph, a, compute_uv=False))
+    enter(
+        [linalg.eigvalsh],
+        lambda graph, a, lower=True: eigvalsh(graph, a, "U" if not lower else "L"),
+    )
+    enter([linalg.eigh], _scipys_eigh)
+    enter([linalg.sqrtm], root_of_matrix)
+    enter([linalg.solve_continuous_lyapunov, linalg.solve_lyapunov], lyapunov)
+    enter([linalg.solve_discrete_lyapunov], lambda graph, a, q: lyapunov(graph, a, q, True))
+
+
+def _enter_integrals(special: Any) -> None:
+    """Enter Bessel's functions and others that are integrals."""
+    for names, kind in ((("j0", "j1", "jv", "jn"), bessel),
+                        (("i0", "i1", "iv"), modified_bessel),
+                        (("k0", "k1", "kv", "kn"), macdonald)):  # fmt: skip
+        for name in names:
+            order = int(name[1]) if name[1].isdigit() else None
+            function = kind if order is None else integral_functions.fixed(kind, order)
+            enter([getattr(special, name)], function)
+    enter([special.exp1], exponential_integral)
+    for name, written in _OF_INTEGRALS.items():
+        formula(getattr(special, name))(written)
 
 
 formula(math.lgamma)(loggamma_of_size)
@@ -88,6 +126,16 @@ def _distances(np: Facade, one: object, other: object) -> Any:
     a, b = traced(np.graph, one), traced(np.graph, other)
     apart = a[:, None, :] - b[None, :, :]
     return np.sqrt(np.sum(apart * apart, axis=-1))
+
+
+def _scipys_pinv(graph: Graph, a: object) -> Any:
+    size = max(traced(graph, a).shape)
+    return pinv(graph, a, size * float(np.finfo(float).eps))
+
+
+def _scipys_eigh(graph: Graph, a: object, *, lower: bool = True, eigvals_only: bool = False) -> Any:
+    whole = eigh(graph, a, "L" if lower else "U")
+    return whole[0] if eigvals_only else tuple(whole)
 
 
 def _of_linalg(name: str) -> Any:
@@ -165,6 +213,29 @@ def pseudo_huber(np: Facade, delta: Any, r: object) -> Any:
     share = r / np.where(delta == 0.0, 1.0, delta)
     smooth = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
     return np.where(delta < 0.0, math.inf, smooth)
+
+
+def _relative_exponential(np: Facade, x: Any) -> Any:
+    """(e^x - 1) / x."""
+    return np.where(x == 0.0, 1.0, np.expm1(x) / np.where(x == 0.0, 1.0, x))
+
+
+_logarithm_of_beta = integral_functions.betaln(loggamma_of_size)
+_OF_INTEGRALS = {
+    **{name: getattr(integral_functions, name) for name in ("ellipk", "ellipe", "erfinv",
+                                                            "erfcinv", "ndtri", "digamma")},
+    "betaln": _logarithm_of_beta,
+    "beta": lambda np, a, b: np.exp(_logarithm_of_beta(np, a, b)),
+    "exprel": _relative_exponential,
+    "entr": lambda np, x: np.where(x > 0.0, -x * np.log(np.where(x > 0.0, x, 1.0)),
+                                   np.where(x == 0.0, 0.0, np.where(x < 0.0, -math.inf, x))),
+    "log_softmax": lambda np, x, axis=None: x - _kept_logsumexp(np, x, axis),
+}  # fmt: skip
+
+
+def _kept_logsumexp(np: Facade, x: object, axis: object) -> Any:
+    top = np.max(x, axis=axis, keepdims=True)
+    return top + np.log(np.sum(np.exp(x - top), axis=axis, keepdims=True))
 
 
 _FORMULAS = {

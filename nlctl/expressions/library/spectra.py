@@ -1,4 +1,4 @@
-"""Eigenvalues and pseudoinverses of small matrices, by formulas."""
+"""Eigenvalues, singular values and pseudoinverses of small matrices."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..arithmetic import Arithmetic
-from ..arrays import traced
+from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from .complex_numbers import ComplexPair
+from .linear_algebra import NotComputed
+from .orthogonal import pseudoinverse, qr
+from .reductions import sum_along
 from .table import Facade, constant_value, of
 
 __all__: list[str] = []
@@ -47,16 +50,105 @@ def eigvals(graph: Graph, a: object) -> Any:
     return ComplexPair(graph, traced(graph, real), traced(graph, [imag, -imag]))
 
 
+of(np.linalg.qr)(qr)
+_WITHOUT_SIGN = "singular vectors, or eigenvectors, whose signs are a question of the machine"
+
+
+@of(np.linalg.svd)
+def svd(
+    graph: Graph, a: object, full_matrices: bool = True, compute_uv: bool = True,
+    hermitian: bool = False,
+) -> Any:  # fmt: skip
+    """Return the singular values of a matrix of two rows and columns, the larger one first."""
+    values = _singular(graph, _matrix(graph, a))
+    if not compute_uv:
+        return values
+    vectors = NotComputed(_WITHOUT_SIGN)
+    triple: Any = type(np.linalg.svd(np.eye(1)))
+    return triple(vectors, values, vectors)
+
+
+def _singular(graph: Graph, matrix: Tracer) -> Tracer:
+    if matrix.shape != (2, 2):
+        raise Untraceable("singular values of a matrix of more than two rows")
+    ((p, q), (r, s)), np_ = matrix, Facade(graph)
+    one, other = np_.hypot(p + s, r - q) * 0.5, np_.hypot(p - s, r + q) * 0.5
+    return traced(graph, [one + other, np_.abs(one - other)])
+
+
+@of(np.linalg.cond)
+def cond(graph: Graph, x: object, p: Any = None) -> Any:
+    """Return the condition number of a matrix of two rows: the ratio of its singular values."""
+    matrix, np_ = _matrix(graph, x), Facade(graph)
+    if p not in (None, 2):
+        raise Untraceable("the condition number of a matrix in another norm")
+    values = _singular(graph, matrix)
+    (a, b), (c, d) = matrix
+    largest = values[0]
+    smallest = np_.abs(a * d - b * c) / largest
+    return np_.where(largest == 0.0, np.inf, largest / smallest)
+
+
+@of(np.linalg.matrix_rank)
+def matrix_rank(graph: Graph, a: object, tol: object = None, **how: object) -> Any:
+    """Return how many singular values are more than rounding."""
+    matrix = _matrix(graph, a)
+    if how:
+        raise Untraceable("a rank with other arguments")
+    values = _singular(graph, matrix)
+    limit = values[0] * (max(matrix.shape) * np.finfo(float).eps) if tol is None else tol
+    return sum_along(graph, Facade(graph).greater(values, limit))
+
+
+@of(np.linalg.eigvalsh)
+def eigvalsh(graph: Graph, a: object, UPLO: str = "L") -> Tracer:
+    """Return the eigenvalues of a symmetric matrix; NumPy reads its lower half."""
+    matrix, np_ = _matrix(graph, a), Facade(graph)
+    matrix = matrix if UPLO == "L" else matrix.T
+    if len(matrix) == 1:
+        return matrix[0]
+    if matrix.shape != (2, 2):
+        raise Untraceable("eigenvalues of a matrix of more than two rows")
+    (p, _), (q, r) = matrix
+    middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
+    return traced(graph, [middle - spread, middle + spread])
+
+
+@of(np.linalg.eigh)
+def eigh(graph: Graph, a: object, UPLO: str = "L") -> Any:
+    """Return the eigenvalues of a symmetric matrix, and nothing of its vectors."""
+    values, vectors = eigvalsh(graph, a, UPLO), NotComputed(_WITHOUT_SIGN)
+    pair: Any = type(np.linalg.eigh(np.eye(1)))
+    return pair(values, vectors)
+
+
+@of(np.roots)
+def roots_of_polynomial(graph: Graph, p: object) -> Any:
+    """Return the roots of a polynomial up to the second degree, in the order of NumPy's."""
+    numbers = traced(graph, p).short()
+    if numbers.ndim != 1:
+        raise Untraceable("np.roots of something else than a list")
+    first = next((k for k, v in enumerate(numbers) if v.only.op != "const" or v.only.data), 0)
+    c = list(numbers)[first:]
+    for end in (c[0], c[-1]):  # of zeros at an end NumPy takes away as many as there are
+        graph.limited(graph.op("ne", end.only, graph.const(0.0)))
+    if len(c) == 2:
+        return traced(graph, [-c[1] / c[0]])
+    if len(c) != 3 or (c[-1].only.op == "const" and not c[-1].only.data):
+        raise Untraceable("np.roots of a polynomial of more than two degrees")
+    return eigvals(graph, [[-c[1] / c[0], -c[2] / c[0]], [1.0, 0.0]])
+
+
 @of(np.linalg.pinv)
 def pinv(graph: Graph, a: object, rcond: float = 1e-15) -> Any:
-    """Return the pseudoinverse of a matrix of at most two rows or columns."""
+    """Return the pseudoinverse of a matrix; of more than two rows and columns, of full rank."""
     matrix = _matrix(graph, a)
     if isinstance(numbers := constant_value(matrix), np.ndarray):
         return traced(graph, np.linalg.pinv(numbers, rcond))
     wide = matrix.shape[0] < matrix.shape[1]
     columns = list(matrix if wide else matrix.T)
     if len(columns) > 2:
-        raise Untraceable("a pseudoinverse of a matrix of more than two rows and columns")
+        return pseudoinverse(graph, matrix)
     np_ = Facade(graph)
     rows = _of_lines(np_, columns)
     if len(columns) == 2:

@@ -11,6 +11,7 @@ import numpy as np
 from ..arithmetic import Arithmetic
 from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
+from . import scattered
 from .surfaces import surface
 from .table import enter
 from .tables import MOST_PIECES, constant_cells, interval_choice, interval_polynomial, polynomial
@@ -38,6 +39,13 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.UnivariateSpline, fitted_spline),
         (interpolate.BivariateSpline, surface),
         (interpolate.RegularGridInterpolator, _grid),
+        (interpolate.LinearNDInterpolator, scattered.between_corners),
+        (interpolate.NearestNDInterpolator, scattered.at_the_nearest),
+        (interpolate.RBFInterpolator, scattered.radial),
+        (
+            (interpolate.KroghInterpolator, interpolate.BarycentricInterpolator),
+            scattered.through_points,
+        ),
         (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
         (tuple(getattr(np.polynomial, name) for name in _POLYNOMIALS), _mapped_polynomial),
     )
@@ -50,6 +58,7 @@ def enter_splines() -> None:
 
     enter([interpolate.splev], splev)
     enter([interpolate.interpn], at_grid)
+    enter([interpolate.griddata], scattered.on_scattered)
 
 
 def _floats(values: object) -> np.ndarray:
@@ -74,8 +83,16 @@ def piecewise_polynomial(
     if nu:
         interpolant = interpolant.derivative(nu)
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
-    if interpolant.c.ndim != 2 or interpolant.c.dtype != float or extrapolate == "periodic":
-        raise Untraceable("a piecewise polynomial with several values, or with a period")
+    if interpolant.c.dtype != float or extrapolate == "periodic":
+        raise Untraceable("a piecewise polynomial with a period, or of complex numbers")
+    if interpolant.c.ndim == 3 and not nu:
+        from scipy.interpolate import PPoly
+
+        columns = [PPoly(interpolant.c[:, :, k], interpolant.x, extrapolate=bool(extrapolate))
+                   for k in range(interpolant.c.shape[2])]  # fmt: skip
+        return _in_columns(graph, columns, piecewise_polynomial, x)
+    if interpolant.c.ndim != 2:
+        raise Untraceable("a piecewise polynomial whose values are matrices")
     breaks, coefficients = interpolant.x, interpolant.c
     if breaks.size > MOST_PIECES or np.any(np.diff(breaks) <= 0):
         raise Untraceable("a piecewise polynomial with too many pieces")
@@ -86,6 +103,15 @@ def piecewise_polynomial(
         return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
     return _elementwise(graph, x, at)
+
+
+def _in_columns(
+    graph: Graph, columns: Sequence[Any], written: Callable[..., Any], x: Arithmetic
+) -> Tracer:
+    """Return several values at each place, by a function of one value for each of them."""
+    values = [traced(graph, written(graph, column, x)).short() for column in columns]
+    cells = np.stack([v.elements() for v in values], axis=-1)
+    return Tracer(graph, cells)
 
 
 def _beyond(
@@ -107,6 +133,12 @@ def b_spline(graph: Graph, interpolant: Any, x: Any, nu: int = 0, extrapolate: A
     from scipy.interpolate import PPoly
 
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
+    if interpolant.c.ndim == 2 and not nu and extrapolate != "periodic":
+        from scipy.interpolate import BSpline
+
+        columns = [BSpline(interpolant.t, c, interpolant.k, bool(extrapolate))
+                   for c in interpolant.c.T]  # fmt: skip
+        return _in_columns(graph, columns, b_spline, x)
     if interpolant.c.ndim != 1 or extrapolate == "periodic":
         raise Untraceable("a spline with several values, or with a period")
     knots = np.unique(interpolant.t[interpolant.k : interpolant.t.size - interpolant.k])
@@ -166,6 +198,8 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
     """Return SciPy's interp1d."""
     kind = getattr(interpolant, "_kind", "")
     values = np.asarray(interpolant.y, dtype=float)
+    if values.ndim == 2 and interpolant.axis in (0, -2):
+        return _in_columns(graph, _of_columns(interpolant, values), table_of_one, x)
     if values.ndim != 1:
         raise Untraceable("a table with several values")
     if kind in ("linear", "linear-np", "slinear") and not hasattr(interpolant, "_spline"):
@@ -191,6 +225,18 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
         return _beyond(graph, e, ends, value, below, above)
 
     return _elementwise(graph, x, at)
+
+
+def _of_columns(interpolant: Any, values: np.ndarray) -> list[Any]:
+    """Return a table of one value for each column of one of several."""
+    fill = "extrapolate" if interpolant._extrapolate else interpolant.fill_value
+    ends = fill if isinstance(fill, tuple) else (fill,)
+    if not interpolant._extrapolate and any(np.ndim(end) for end in ends):
+        raise Untraceable("a table with several values, and with others for each beyond its ends")
+    spline = getattr(interpolant, "_spline", None)
+    kind = interpolant._kind if spline is None else spline.k
+    how = {"kind": kind, "fill_value": fill, "bounds_error": interpolant.bounds_error}
+    return [type(interpolant)(interpolant.x, column, **how) for column in values.T]
 
 
 _STEPS = ("nearest", "nearest-up", "previous", "next")
@@ -224,19 +270,15 @@ def _fill(interpolant: Any) -> tuple[Any, Any]:
 def _grid(graph: Graph, interpolant: Any, xi: object, method: Any = None) -> Any:
     """Return SciPy's interpolation on a grid: linear along one axis after the other."""
     values = np.asarray(interpolant.values, dtype=float)
-    if (method or interpolant.method) != "linear" or values.ndim != len(interpolant.grid):
-        raise Untraceable("an interpolation on a grid that is not linear")
-    array = traced(graph, list(xi) if isinstance(xi, tuple) else xi)
-    flat = isinstance(xi, tuple) and array.ndim == 1
-    rows = array.short().reshape(1, -1) if array.ndim == 1 else array.short()
-    if isinstance(xi, tuple) and array.ndim > 1:
-        raise Untraceable("an interpolation on a grid at several points")
-    results = [_on_grid(graph, interpolant, values, [graph.number(e) for e in row.elements()])
-             for row in rows]  # fmt: skip
-    cells = np.empty(len(results), dtype=object)
-    cells[:] = results
-    whole = Tracer(graph, cells)
-    return whole[0] if flat else whole
+    how = method or interpolant.method
+    if how not in _ALONG or values.ndim != len(interpolant.grid):
+        raise Untraceable("an interpolation on a grid that is neither linear nor nearest")
+
+    def at(*place: Any) -> Any:
+        numbers = [graph.number(v.only) for v in place]
+        return scalar(graph, _on_grid(graph, interpolant, how, values, numbers))
+
+    return scattered.at_points(graph, (xi,), at)
 
 
 def at_grid(
@@ -246,16 +288,28 @@ def at_grid(
     from scipy.interpolate import RegularGridInterpolator
 
     places = tuple(np.asarray(_numbers(v)) for v in points)
-    return _grid(graph, RegularGridInterpolator(places, _numbers(values), *rest, **options), xi)
+    return _grid(
+        graph,
+        RegularGridInterpolator(places, _numbers(values), *rest, **options),
+        _in_a_row(graph, xi),
+    )
 
 
-def _on_grid(graph: Graph, interpolant: Any, values: np.ndarray, x: Sequence[Expr]) -> Expr:
+def _in_a_row(graph: Graph, xi: object) -> Any:
+    """Return coordinates of one point as an array, of which SciPy returns one value in a row."""
+    array = traced(graph, list(xi)) if isinstance(xi, tuple) else xi
+    return array if isinstance(array, Tracer) and array.ndim < 2 else xi
+
+
+def _on_grid(
+    graph: Graph, interpolant: Any, how: str, values: np.ndarray, x: Sequence[Expr]
+) -> Expr:
     cells: Any = constant_cells(graph, values)
     for axis in range(len(x) - 1, -1, -1):
         places = np.asarray(interpolant.grid[axis], dtype=float)
         reduced = np.empty(cells.shape[:-1], dtype=object)
         for index in np.ndindex(reduced.shape):
-            reduced[index] = _between(graph, places, cells[index], x[axis])
+            reduced[index] = _ALONG[how](graph, places, cells[index], x[axis])
         cells = reduced
     value: Any = cells[()] if isinstance(cells, np.ndarray) else cells
     for axis, e in enumerate(x):
@@ -278,3 +332,18 @@ def _between(graph: Graph, places: np.ndarray, values: Sequence[Expr], x: Expr) 
         low = op("mul", values[j], op("sub", const(1.0), part))
         pieces.append(op("add", low, op("mul", values[j + 1], part)))
     return interval_choice(graph, x, list(map(float, places[1:-1])), pieces)
+
+
+def _next(graph: Graph, places: np.ndarray, values: Sequence[Expr], x: Expr) -> Expr:
+    """Return the value next to x: up to the middle, as SciPy computes that, the left one."""
+    op, const = graph.op, graph.const
+    pieces = []
+    for j in range(places.size - 1):
+        part = op("div", op("sub", x, const(float(places[j]))),
+                  const(float(places[j + 1] - places[j])))  # fmt: skip
+        pieces.append(op("select", op("le", part, const(0.5)), values[j], values[j + 1]))
+    chosen = interval_choice(graph, x, list(map(float, places[1:-1])), pieces)
+    return op("select", op("eq", x, x), chosen, const(np.nan))
+
+
+_ALONG = {"linear": _between, "nearest": _next}

@@ -17,11 +17,13 @@ _REMEDIES = (
      "integral a state of the block"),
     (r"passes than are written out",
      "a better first guess, or a method that needs fewer passes"),
-    (r"\b(jv|jn|yv|yn|iv|kv|j0|j1|y0|y1|i0|i1|k0|k1|ellip\w*|beta\w*|hyp\w*|airy|zeta|lambertw|"
-     r"Lambert)\b",
+    (r"\b(jv|jn|yv|yn|iv|kv|j0|j1|y0|y1|i0|i1|k0|k1|ber|bei|struve|"
+     r"ellip\w*|beta\w*|hyp\w*|airy|zeta|lambertw|Lambert)\b",
      "a table of it before the run, scipy.interpolate.CubicSpline, is traced"),
     (r"griddata|RBFInterpolator|LinearND|CloughTocher|NearestND|KDTree",
      "a table on a grid, scipy.interpolate.RegularGridInterpolator, is traced"),
+    (r"float32", "leave out dtype=np.float32: what runs computes in doubles"),
+    (r"np\.roots", "search for one root by scipy.optimize.brentq or newton"),
     (r"eigen|singular|svd|\beig\w*|schur|logm|sqrtm|pinv|condition number|qr\b",
      "compute it before the run where the matrix is constant; of two rows write the formula"),
     (r"writes messages|message is written", "leave messages out, or read them off the response"),

@@ -442,9 +442,12 @@ def _part(value: KnownValue, i: int, count: int) -> KnownValue:
     choices = known.choices if isinstance(known, OneOf) else (value,)
     rows = [c.known for c in choices]
     if all(isinstance(row, list | tuple) and len(row) == count for row in rows):
-        return least_upper_bound([replace(element(value), known=UNKNOWN_VALUE)] if all(
-            isinstance(row[i], (*PLAIN, np.ndarray)) for row in rows
-        ) else [captured(row[i]) for row in rows])  # fmt: skip
+        column = [row[i] for row in rows]
+        if all(isinstance(part, (*PLAIN, np.ndarray)) for part in column):
+            return replace(element(value), known=UNKNOWN_VALUE)
+        whole = least_upper_bound([captured(part) for part in column])
+        is_open = isinstance(whole.known, Unknown)
+        return replace(whole, known=choice_among(column)) if is_open else whole
     return element(value)
 
 

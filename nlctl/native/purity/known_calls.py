@@ -9,7 +9,7 @@ import functools
 import inspect
 import logging
 import warnings
-from collections import Counter, OrderedDict, defaultdict, deque
+from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.library.table import WRITTEN
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from .values import (
@@ -59,9 +60,10 @@ VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d
          "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
          "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
          "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
-         "to_numpy"}  # fmt: skip
+         "to_numpy", "sliding_window_view"}  # fmt: skip
 WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
-           "insort_left", "insort_right"}  # fmt: skip
+           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
+           "heappushpop"}  # fmt: skip
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
             "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
 # functions that draw random numbers inside, read or write files, or change settings for everybody
@@ -169,6 +171,8 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
     if isinstance(thing, np.vectorize):
         _call_functions(walk, [walk.captured(thing, "pyfunc", thing.pyfunc)])
         return FRESH
+    if thing is namedtuple:
+        return made.named_tuple(given)
     if thing is dataclasses.replace and places:
         return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
@@ -193,6 +197,8 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     """Return what is known of the result of a function or method of Python code."""
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
+        if (type(owner).__name__, thing.__name__) in WRITTEN:
+            return FRESH
         if thing.__name__ in _OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
             raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
@@ -373,6 +379,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
     if operator is not None:
         return walk.function(operator, Given(places))
+    if name == "vars" and len(places) == 1:
+        return made.attributes_of(walk, places[0])
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         if name not in _ITERATING or not iterates(walk, value):
             _check_parts(value, name)
@@ -448,7 +456,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     name = getattr(thing, "__name__", "")
     if name in _SEEDED and given.places and type(given.places[0].known) is int:
         return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
-    if module.startswith(VARYING):
+    if module.startswith(VARYING) and not module.startswith("numpy.lib.stride_tricks"):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
         raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
@@ -460,7 +468,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
             check_object(value, f"hands {name}")
     if name in WRITERS or (module.endswith("operator") and name in IN_PLACE):
         _written(given.places[0], f"{name}()")
-        return FRESH
+        return element(given.places[0]) if "heap" in name else FRESH
     if module in ("operator", "_operator") and isinstance(thing, type):
         return KnownValue(True, True, known=Pure(gives_parts=True))
     if _makes_objects(thing, module):

@@ -11,7 +11,7 @@ import dataclasses
 import enum
 import inspect
 from collections.abc import Callable, Mapping
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any, Generic, Protocol
 
 from .values import (
@@ -25,6 +25,7 @@ from .values import (
     Pure,
     Unknown,
     captured,
+    holder,
     library,
 )
 from .walk import Walk
@@ -186,6 +187,27 @@ def of_class(walk: Walk, base: KnownValue, member: Callable[..., Any]) -> KnownV
     if isinstance(member, FunctionType):
         return KnownValue(True, True, known=Bound(captured(member), Given((base,))))
     return captured(member)
+
+
+def named_tuple(given: Given) -> KnownValue:
+    """Return the class that `collections.namedtuple` makes of names that are written out."""
+    places, names = ([v.known for v in given.places], {k: v.known for k, v in given.names.items()})
+    if any(isinstance(v, Unknown) for v in (*places, *names.values())):
+        raise Impure("makes a named tuple of what is only known when it runs", "name its fields")
+    return captured(collections.namedtuple(*places, **names))  # pyright: ignore
+
+
+def attributes_of(walk: Walk, value: KnownValue) -> KnownValue:
+    """Return what is known of the attributes of an object by their names."""
+    thing = value.known
+    if isinstance(thing, Instance):
+        return holder(thing.attributes.values())
+    if isinstance(thing, Unknown | type | ModuleType) or not hasattr(thing, "__dict__"):
+        raise Impure("calls vars() of what is only known when it runs", "name the attributes")
+    walk.captured(thing, "__dict__", vars(thing))  # which may have more one day
+    for name, part in vars(thing).items():
+        walk.captured(thing, name, part)
+    return dataclasses.replace(captured(dict(vars(thing))), inside=False)
 
 
 def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None:

@@ -189,6 +189,8 @@ class CallWalker(Expressions):
                 name = getattr(part, "name", None) or getattr(part, "rest", None)
                 if name:
                     self.assign(name, KnownValue(subject.own and subject.inside, subject.inside))
+                if isinstance(part, ast.MatchSingleton) and part.value is not None:
+                    raise Impure("tests identity with a case of True or False", "write if")
                 if isinstance(part, ast.MatchClass):
                     self.generic_visit(part)
             if case.guard is not None:

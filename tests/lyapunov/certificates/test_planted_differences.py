@@ -287,7 +287,7 @@ EQUATIONS = {
     "a plant that cannot be read on intervals": (
         lambda: {
             "plant": plant(
-                lambda t, x, u, p: (x[1], UPDATE(t, x, u, p)[1] + scipy.special.j0(t))
+                lambda t, x, u, p: (x[1], UPDATE(t, x, u, p)[1] + scipy.special.ber(t))
             )
         },
         "cannot be evaluated on intervals",

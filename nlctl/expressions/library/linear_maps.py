@@ -1,0 +1,65 @@
+"""Functions of SciPy that are linear in their data: what they make of unit vectors is a matrix."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, traced
+from ..graph import Graph, Untraceable
+from .scattered import known_numbers
+from .table import enter
+
+__all__: list[str] = []
+
+_MOST = 64  # elements of the data
+
+
+@functools.cache
+def enter_linear_maps() -> None:
+    """Enter them; the data are the first argument, the third one of a filter."""
+    from scipy import integrate, ndimage, signal
+
+    for function in (integrate.simpson, signal.savgol_filter, signal.detrend,
+                     ndimage.gaussian_filter1d, ndimage.uniform_filter1d):  # fmt: skip
+        enter([function], _by_matrix(function, 0))
+    for function in (signal.lfilter, signal.filtfilt, ndimage.correlate1d, ndimage.convolve1d):
+        place = 2 if function in (signal.lfilter, signal.filtfilt) else 0
+        enter([function], _by_matrix(function, place))
+
+
+def _by_matrix(function: Callable[..., Any], place: int) -> Callable[..., Any]:
+    def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
+        what = f"options of {function.__name__}"
+        given = [v if k == place or v is None or isinstance(v, str) else known_numbers(v, what)
+                 for k, v in enumerate(arguments)]  # fmt: skip
+        named = {k: v if v is None or isinstance(v, str) else known_numbers(v, what)[()]
+                 for k, v in options.items() if k != "axis"}  # fmt: skip
+        if len(given) <= place:
+            raise Untraceable(f"{function.__name__} with its data by name")
+        data = traced(graph, given[place]).short()
+        if data.ndim != 1 or data.size > _MOST or options.get("axis", -1) not in (-1, 0):
+            raise Untraceable(f"{function.__name__} of something else than a short row")
+
+        def of(values: np.ndarray) -> np.ndarray:
+            whole = [v if k == place or v is None or isinstance(v, str) else v[()]
+                     for k, v in enumerate(given)]  # fmt: skip
+            return np.asarray(function(*whole[:place], values, *whole[place + 1 :], **named))
+
+        if np.any(of(np.zeros(data.size))):
+            raise Untraceable(f"{function.__name__}, which adds something here")
+        columns = np.array([of(unit) for unit in np.eye(data.size)])
+        if not columns[0].shape:
+            return _weighed(data, columns)
+        return traced(graph, [_weighed(data, row) for row in columns.T])
+
+    return written
+
+
+def _weighed(data: Tracer, weights: np.ndarray) -> Any:
+    """Return a weighted sum: zeros, too, hand NaN on."""
+    parts = [data[k] * float(w) for k, w in enumerate(weights)]
+    return functools.reduce(lambda a, b: a + b, parts)

@@ -1,0 +1,173 @@
+"""Functions of NumPy, SciPy and Python that are formulas: at points, what Python itself returns."""
+
+import bisect
+import heapq
+import math
+from collections import namedtuple
+
+import control as ct
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.interpolate
+import scipy.linalg
+import scipy.ndimage
+import scipy.signal
+from scipy import special, stats
+
+import nlctl
+
+CORNERS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.0, 3.0], [1.0, 1.5]])
+HEIGHTS = np.array([0.0, 1.0, 2.0, 3.0, 9.0])
+TRIANGLES = scipy.interpolate.LinearNDInterpolator(CORNERS, HEIGHTS, fill_value=-1.0)
+RADIAL = scipy.interpolate.RBFInterpolator(CORNERS, HEIGHTS)
+NEAREST = scipy.interpolate.NearestNDInterpolator(CORNERS, HEIGHTS)
+NEWTON = scipy.interpolate.KroghInterpolator([0.0, 1.0, 2.5], [0.0, 1.0, -4.0])
+CURVE = scipy.interpolate.CubicSpline([0.0, 1.0, 2.0], [[0.0, 1.0], [1.0, 0.0], [4.0, 1.0]])
+STEPS = scipy.interpolate.interp1d([0.0, 1.0, 2.0], [[0.0, 1.0], [1.0, 0.0], [4.0, 1.0]], axis=0,
+                                   bounds_error=False, fill_value=0.5)  # fmt: skip
+GRID = scipy.interpolate.RegularGridInterpolator(
+    ([0.0, 1.0], [0.0, 2.0]), np.arange(4.0).reshape(2, 2), method="nearest",
+    bounds_error=False, fill_value=None,
+)  # fmt: skip
+
+
+class Settings:
+    """A record whose attributes are read by their names."""
+
+    def __init__(self):
+        self.gain, self.weights = 3.0, np.array([1.0, 2.0])
+
+
+SETTINGS = Settings()
+
+
+def regular(x):
+    return np.outer(x[:3], x[1:]) + 9.0 * np.eye(3)
+
+
+def made_inside(x):
+    pair = namedtuple("Pair", "a b")(x[0], x[1])
+    return pair.a * pair._replace(b=2.0).b
+
+
+def depth(n, z):
+    total = 0.0
+    while n > 0:
+        total, n = total + depth(n - 1, z) + z, n - 1
+    return total
+
+
+FUNCTIONS = {
+    "bits of Python's integers": lambda x: (int(10 * x[0]) & 12) + (int(x[1]) | 5) ^ 6,
+    "bits below zero": lambda x: (int(10 * x[0]) & -4) + (~int(x[1])),
+    "shifts": lambda x: (int(10 * x[0]) >> 2) + (int(x[1]) << 3) + (1 << int(x[0] > 0)),
+    "quotients": lambda x: int(10 * x[0]) // 3 + int(10 * x[1]) // -4,
+    "bits of NumPy's": lambda x: np.bitwise_xor((10 * x).astype(int), 5).sum(),
+    "truth and integer": lambda x: np.sum((1 - (x > 0)) & (1 - (x > 1))) + ((x[0] > 0) & 3),
+    "Python's decimals": lambda x: round(float(x[0]), 2) + round(math.sin(x[1]), 3),
+    "decimals at ties": lambda x: round(float(np.round(200 * x[0])) / 200, 2),
+    "logarithm to a base": lambda x: math.log(abs(x[0]) + 1, 3),
+    "many legs": lambda x: math.hypot(*x),
+    "default": lambda x: max(map(abs, x), default=0.0),
+    "a sum of a generator": lambda x: math.fsum(k * v for k, v in enumerate(x)),
+    "largest": lambda x: heapq.nlargest(2, x[:3])[1],
+    "vars": lambda x: vars(SETTINGS)["gain"] * x[0] + vars(SETTINGS)["weights"] @ x[:2],
+    "a named tuple": made_inside,
+    "recursion with a loop": lambda x: depth(3, x[0]),
+    "histogram": lambda x: np.histogram(x, [-1.0, 0.0, 0.5, 2.0])[0] @ [1, 10, 100],
+    "weighted histogram": lambda x: np.histogram(x, 3, (-1, 1), weights=x**2)[0][1],
+    "bincount": lambda x: np.bincount((x > 0).astype(int), weights=x, minlength=2)[1],
+    "isin": lambda x: np.sum(np.isin(np.sign(x), [1, 0])),
+    "choose": lambda x: np.choose((x[0] > 0).astype(int), [x[1], 2 * x[2]]),
+    "nanargmax": lambda x: np.nanargmax(np.where(x == max(x), np.nan, x)),
+    "a mean where": lambda x: np.mean(x, where=x > -9),
+    "uneven gradient": lambda x: np.gradient(x, [0.0, 0.1, 0.3, 0.4])[1],
+    "windows": lambda x: np.lib.stride_tricks.sliding_window_view(x, 2).mean(axis=1)[1],
+    "fabs": lambda x: np.fabs(x).sum(),
+    "QR": lambda x: np.linalg.qr(regular(x))[0][1, 2] + np.linalg.qr(regular(x))[1][0, 1],
+    "pseudoinverse": lambda x: np.linalg.pinv(regular(x)[:, :]).sum(),
+    "wide": lambda x: np.linalg.pinv(np.vstack([np.ones(4), np.arange(4.0), 0.1 * x])) @ x[:3] @ x,
+    "least squares": lambda x: np.linalg.lstsq(regular(x), x[:3], rcond=None)[0] @ x[1:],
+    "square root": lambda x: scipy.linalg.sqrtm(np.eye(2) + np.outer(x[:2], x[:2]))[0, 1],
+    "Lyapunov": lambda x: scipy.linalg.solve_continuous_lyapunov(
+        np.array([[-1.0, 0.2], [0.1 * np.tanh(x[2]), -2.0]]), -np.outer(x[:2], x[:2])
+    )[0, 1],
+    "Toeplitz": lambda x: scipy.linalg.toeplitz(x)[1] @ x,
+    "roots": lambda x: np.roots([1.0, x[0], -1.0 - x[1] ** 2]).real.max() + x[2],
+    "Bessel": lambda x: special.j0(x[0]) + special.jv(-3, x[1]) + special.i1(x[2]),
+    "Macdonald": lambda x: special.k0(np.abs(x[0]) + 1e-3) + special.kv(2.5, x[1] ** 2 + 0.1),
+    "exponential integral": lambda x: special.exp1(np.abs(x[0]) + 1e-6),
+    "elliptic": lambda x: special.ellipk(0.9 * np.tanh(x[0])) + special.ellipe(-(x[1] ** 2)),
+    "inverse of erf": lambda x: special.erfinv(0.9 * np.tanh(x[0]))
+    + special.ndtri(1e-9 + x[1] ** 2 / 2000),
+    "digamma": lambda x: special.digamma(x[0] + 0.01) + special.beta(x[1] ** 2 + 0.1, 2.0),
+    "normal": lambda x: stats.norm.cdf(x[0], loc=x[1], scale=2.0) + stats.norm.pdf(x[2]),
+    "triangles": lambda x: TRIANGLES(x[0], x[1]) + TRIANGLES(np.abs(x[:2])).sum(),
+    "griddata": lambda x: scipy.interpolate.griddata(CORNERS, HEIGHTS, (abs(x[0]), 1.0)),
+    "nearest": lambda x: NEAREST(x[0], x[1]),
+    "radial": lambda x: RADIAL(x[None, :2])[0],
+    "Newton's form": lambda x: NEWTON(x[0]) + NEWTON(x).sum(),
+    "a curve": lambda x: CURVE(x[0]) @ x[1:3] + STEPS(x[2])[1],
+    "a grid's nearest": lambda x: GRID((x[0], x[1])),
+    "Simpson": lambda x: scipy.integrate.simpson(x, x=[0.0, 1.0, 2.0, 4.0]),
+    "filters": lambda x: scipy.signal.lfilter([0.5], [1, -0.5], x)[2]
+    + scipy.ndimage.gaussian_filter1d(x, 1.0)[0],
+    "bisect": lambda x: bisect.bisect([0.0, 1.0], x[0]),
+}  # fmt: skip
+
+
+def points():
+    rng = np.random.default_rng(5)
+    return rng.normal(size=(240, 4)) * np.resize([0.1, 0.5, 1.0, 3.0, 10.0], (240, 1))
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+@pytest.mark.filterwarnings("ignore")
+def test_a_function_is_traced_with_pythons_values(name):
+    """At 240 points to 1e-12; where SciPy has NaN there is NaN."""
+    function = FUNCTIONS[name]
+    system = ct.nlsys(lambda t, x, u, p: [function(x), 0.0 * x[0], 0.0, 0.0], None,
+                      states=4, inputs=1, outputs=4)  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    found = np.array([compiled.dynamics(0.0, x, [0.0])[0] for x in points()])
+    wanted = np.array([float(function(x)) for x in points()])
+    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_where_a_rank_is_lost_the_function_is_called():
+    """x' = x - x by least squares of a matrix that has rank two from the beginning."""
+
+    def update(t, x, u, p):
+        matrix = np.diag([x[0], x[1], 0.0])
+        return np.linalg.lstsq(matrix, np.array([x[0], x[1], 1.0]), rcond=None)[0] - x
+
+    compiled = nlctl.compile(ct.nlsys(update, None, states=3, inputs=1, outputs=3))
+    response = nlctl.input_output_response(compiled, [0.0, 1.0], 0.0, [0.5, 0.25, 1.0])
+    ends = [1 - 0.5 * np.exp(-1), 1 - 0.75 * np.exp(-1), np.exp(-1)]
+    np.testing.assert_allclose(response.outputs[:, -1], ends, rtol=1e-5)
+
+
+@pytest.mark.parametrize("cases", ["True", "False"])
+def test_a_case_of_a_truth_value_asks_for_identity_and_is_refused(cases):
+    source = {"True": _true, "False": _false}[cases]
+    with pytest.raises(nlctl.errors.CompileError, match="identity"):
+        nlctl.compile(ct.nlsys(source, None, states=1, inputs=1, outputs=1))
+
+
+def _true(t, x, u, params):
+    match float(x[0]) > 1.0:
+        case True:
+            return [1.0]
+        case _:
+            return [2.0]
+
+
+def _false(t, x, u, params):
+    match float(x[0]) > 1.0:
+        case False:
+            return [1.0]
+        case _:
+            return [2.0]
