@@ -287,8 +287,7 @@ class Compiled(Reading, StandIn):
             the equations, by a record's `derived`.
         """
         places = jacobians.float_parameters(self)
-        p = self.parameter_vector(params)  # blocks have the run's parameters then
-        jacobians.tell_of_differences(self, p)
+        jacobians.tell_of_differences(self, self.parameter_vector(params))  # blocks have these
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))
         for k, name in enumerate(parameters):

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..expressions.bends import replaced_parts
-from ..expressions.conditions import conditions, square_of
+from ..expressions.conditions import conditions, number_rooted
 from ..expressions.graph import ORDERS, Expr, Graph
 from .directions import Direction
 from .source import EquationParts
 
-_BETWEEN = 1e2  # times what is passed at once: on either side of an instant
+_BETWEEN = 1e-3  # of how late a turn may be seen: on either side of a corner
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class Corner:
 
 
 def corners_of(
-    source: EquationParts, become: Expr, seeds: Sequence[Direction], rounding: Expr
+    source: EquationParts, become: Expr, seeds: Sequence[Direction], longest: Expr
 ) -> list[Corner]:
     """Return the corners of what drives a memory but for those where the memory is met."""
     graph, jumps, corners = source.graph, set(source.jumps), []
@@ -43,7 +43,7 @@ def corners_of(
         (rate,) = source.slopes([level], source.time(source.flow, delays_move=False))
         if rate is None:
             continue
-        little = graph.op("mul", graph.op("mul", graph.const(_BETWEEN), rounding), rate)
+        little = graph.op("mul", graph.op("mul", graph.const(_BETWEEN), longest), rate)
         was, is_then = (
             graph.op("gt", graph.op(op, level, little), graph.const(0.0)) for op in ("sub", "add")
         )
@@ -82,7 +82,7 @@ def _sides(graph: Graph, node: Expr) -> tuple[Expr | None, Expr, Expr]:
     """Return what is 0 at a corner, and what an operation is above that and below."""
     op, args = node.op, [graph.number(arg) for arg in node.args]
     one, yes, no = graph.const(1.0), graph.const(True), graph.const(False)
-    square = square_of(node)
+    square = number_rooted(node)
     if square is not None:
         return square, square, graph.op("neg", square)
     if op in ORDERS or op in ("minimum", "maximum"):

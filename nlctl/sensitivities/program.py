@@ -226,6 +226,8 @@ class _Maker:
         jumping = self.sides.watches or self.source.driven or self.places.lines
         if equations.results.get("reset") or jumping:
             results["reset"] = self._resets()
+        if "sharp" in equations.results:  # derivatives are as narrow as the functions themselves
+            results["sharp"] = equations.results["sharp"]
         for name in equations.results:
             if name.startswith("sample"):
                 results[name] = self._samples(name)

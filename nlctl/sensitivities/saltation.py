@@ -22,12 +22,12 @@ from ..expressions.dependence import reads
 from ..expressions.graph import Expr, Graph, needed
 from .branches import bounded
 from .causes import Cause, When, when_of
-from .corners import Corner, at_corner, corners_of
 from .directions import Direction, SomeRows, Taken, rows_replaced
 from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
+from .turns import Turns
 
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
@@ -196,6 +196,13 @@ class Saltation:
             touched = graph.op("or", touched, touch)
         return self._first(self.places.grazing, touched)
 
+    @cached_property
+    def _turns(self) -> Turns:
+        """Derivatives of memories that are driven."""
+        return Turns(
+            source=self.source, sides=self.sides, places=self.places, seeds=self.seeds
+        )  # fmt: skip
+
     def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
         """Return the derivative of an expression in a direction."""
         return self.source.slopes([level], seed)
@@ -204,7 +211,7 @@ class Saltation:
         """Return what derivatives of memories become where these turn, by their states."""
         places, driven = self.places, self.source.driven
         return {
-            places.derivative(j) + m: self._kept(j, m, at_turn=True)
+            places.derivative(j) + m: self._turns.kept(j, m, at_turn=True)
             for j in range(places.by)
             for m in driven
         }
@@ -223,57 +230,7 @@ class Saltation:
         for _, size in self.source.flow:
             pieces.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return rows_replaced(graph, pieces, {m: self._kept(j, m) for m in self.source.driven})
-
-    def _kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
-        """Return the derivative of a memory, which is integrated only while it is not driven."""
-        # A step ends a little behind where it has reversed.
-        graph = self.source.graph
-        kept = self.sides.memories[m]
-        become = self.source.driven[m]
-        (change,) = self.change(become, self.seeds[j])
-        derivative = graph.const(0.0) if change is None else change
-        corners = self._corners[m] if at_turn else []
-        if at_turn and change is not None:
-            late, flowing = self._late(become), list(self.source.flow)
-            for i in range(self.places.by):
-                rates = self.source.changes([e for e, _ in self.source.flow], self.seeds[i])
-                sizes = (size for _, size in self.source.flow)
-                flowing += zip(rates, sizes, strict=True)
-            forward = self.source.time(flowing, delays_move=False)
-            (rate,) = self.source.slopes([change], forward)
-            if rate is not None:
-                derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
-        if corners:
-            here, there = at_corner(self.source, become, corners, self.seeds)
-            derivative = graph.op("select", here, there[j], derivative)
-        (derivative,) = self.sides.kept([derivative])
-        moved = graph.op("ne", graph.leaf("x", m, None), kept)
-        integrated = graph.leaf("x", self.places.derivative(j) + m, None)
-        return graph.op("select", moved, derivative, integrated)
-
-    @cached_property
-    def _corners(self) -> dict[int, list[Corner]]:
-        """Corners of what drives memories, by their states."""
-        return {
-            m: corners_of(self.source, become, self.seeds, self._rounding)
-            for m, become in self.source.driven.items()
-        }
-
-    def _late(self, become: Expr) -> Expr:
-        """Return how long ago what drives a memory has reversed, 0 at a break."""
-        # Where it turns is located by a difference of rates: a little too early or too late.
-        graph, source = self.source.graph, self.source
-        zero = graph.const(0.0)
-        forward = source.time(source.flow, delays_move=False)
-        (rate,) = self.source.slopes([become], forward)
-        (bend,) = self.source.slopes([rate or zero], forward)
-        if bend is None:
-            return zero
-        late = graph.op("div", rate or zero, bend)
-        longest = graph.leaf("p", source.extended.slot("late").offset, None)
-        recent = graph.op("le", graph.op("absolute", late), longest)
-        return graph.op("select", recent, late, zero)
+        return rows_replaced(graph, pieces, {m: self._turns.kept(j, m) for m in self.source.driven})
 
     def _jumped(
         self,
