@@ -70,19 +70,19 @@ def parameter_values(compiled: Compiled, p: np.ndarray) -> dict[str, float]:
 
 def check_written_out(compiled: Compiled, what: str, p: np.ndarray) -> None:
     """Refuse what is called, or searched, or may take more passes than are written out."""
-    found = compiled.equations_with(p)
-    for call in found.calls.values():
+    equations = compiled.equations_with(p)
+    for call in equations.calls.values():
         raise CompileError(
             f"'{what}' cannot be exported: a function of it is called ({call.reason})"
         )
-    searched = bool(found.solvers)
+    searched = bool(equations.solvers)
     refuse_if_any(what, {"has an algebraic loop, whose signals are searched for": searched})
-    for function in described_functions(compiled.schedule, found.cut):
+    for function in described_functions(compiled.schedule, equations.cut):
         raise CompileError(
             f"'{what}' cannot be exported: a loop in the {function} may take more passes than are "
             "written out, and there is nobody to call the function then: take a fixed number of "
-            f"passes, 'for _ in range({_ENOUGH})' without 'break', in the place of 'while' or a "
-            "search of SciPy, and scipy.integrate.fixed_quad in that of quad; "
+            f"passes, 'for _ in range({_ENOUGH})' without 'break', instead of 'while' or a "
+            "search of SciPy, and scipy.integrate.fixed_quad instead of quad; "
             "nlctl.input_output_response runs it as it is"
         )
 

@@ -27,7 +27,7 @@ from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
-from .turns import Turns
+from .turns import DrivenMemories
 
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
@@ -197,9 +197,9 @@ class Saltation:
         return self._first(self.places.grazing, touched)
 
     @cached_property
-    def _turns(self) -> Turns:
+    def _turns(self) -> DrivenMemories:
         """Derivatives of memories that are driven."""
-        return Turns(
+        return DrivenMemories(
             source=self.source, sides=self.sides, places=self.places, seeds=self.seeds
         )  # fmt: skip
 

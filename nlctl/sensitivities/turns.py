@@ -17,7 +17,7 @@ from .source import EquationParts
 
 
 @dataclass(frozen=True, kw_only=True)
-class Turns:
+class DrivenMemories:
     """Where memories that are driven turn."""
 
     source: EquationParts

@@ -39,7 +39,7 @@ CORNERS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["auto", "rodas5p"])
+@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
 @pytest.mark.parametrize("law", CORNERS)
 def test_play_that_turns_at_a_corner(law, method):
     """v = A - c from t = P on, wherever that is, until u has fallen by 2 c."""
@@ -149,7 +149,7 @@ def by_relay():
     return [rule, relay, moving], {"relay.on": 1.0, "rule.g": 0.0}, 0.6
 
 
-@pytest.mark.parametrize("method", ["auto", "rodas5p"])
+@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
 @pytest.mark.parametrize("cause", [by_time, by_crossing, by_clock, by_relay])
 def test_reset_by_what_makes_its_guard_jump(cause, method):
     """Behind the reset at T h = a + q (t - T), and T moves as the cause says."""
