@@ -67,8 +67,9 @@ def export_controller(
     ParameterError
         If it is not sampled and `dt` is not given, or a name is none in C.
     CompileError
-        If a target cannot hold it: functions that are called, a search for signals of an algebraic
-        loop, several clocks, a delay or jitter of its clock.
+        If a target cannot hold it: functions that are called, loops without a fixed number of
+        passes, a search for signals of an algebraic loop, several clocks, a delay
+        or jitter of its clock.
 
     Examples
     --------
@@ -81,9 +82,9 @@ def export_controller(
     part = _sampled_part(_block_of(diagram, block), dt, method)
     alone = _alone(part)
     compiled = native.compile(alone)
-    check_written_out(compiled, block)
     clock = _clock_of(compiled, block)
     p = compiled.parameter_vector(_parameters_of(part, block, diagram, params or {}))
+    check_written_out(compiled, block, p)
     lowered = compiled.lowered
     if not lowered.holds_for(p[:, None]):
         raise ParameterError(

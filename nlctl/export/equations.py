@@ -53,8 +53,8 @@ def export_equations(
         If the name is none in C.
     CompileError
         If functions in C cannot say it: sampled blocks, resets, transport delays, functions that
-        are called, a search for signals of an algebraic loop, discrete time, other integers in
-        `params` that steer equations.
+        are called, loops without a fixed number of passes, a search for signals of an algebraic
+        loop, discrete time, other integers in `params` that steer equations.
 
     Examples
     --------
@@ -65,9 +65,9 @@ def export_equations(
     """
     compiled = native.compile(diagram)
     what = str(diagram.name)
-    check_written_out(compiled, what)
     _check_continuous(compiled, what)
     p = compiled.parameter_vector(params)
+    check_written_out(compiled, what, p)
     check_integers(compiled, p, what)
     values, start = parameter_values(compiled, p), state_of(diagram, initial_state)
     labels, lowered = tuple(compiled.state_labels or ()), compiled.lowered

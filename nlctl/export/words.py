@@ -10,8 +10,10 @@ import numpy as np
 
 from ..errors import CompileError, ParameterError
 from ..native import Compiled
+from ..native.describe import described_functions
 from ..native.diagram.parameters import Slot
 
+_ENOUGH = 20  # passes that are proposed: Newton's method needs less
 _RESERVED = re.compile(
     "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|"
     "inline|int|long|register|restrict|return|short|signed|sizeof|static|struct|switch|typedef|"
@@ -66,12 +68,23 @@ def parameter_values(compiled: Compiled, p: np.ndarray) -> dict[str, float]:
     return {names.get(i, f"p[{i}]"): float(value) for i, value in enumerate(p)}
 
 
-def check_written_out(compiled: Compiled, what: str) -> None:
-    """Refuse functions that are called, and algebraic loops that are searched."""
-    for reason in compiled.lowered.opaque.values():
-        raise CompileError(f"'{what}' cannot be exported: a function of it is called ({reason})")
-    searched = bool(compiled.lowered.solvers)
+def check_written_out(compiled: Compiled, what: str, p: np.ndarray) -> None:
+    """Refuse what is called, or searched, or may take more passes than are written out."""
+    equations = compiled.equations_with(p)
+    for call in equations.calls.values():
+        raise CompileError(
+            f"'{what}' cannot be exported: a function of it is called ({call.reason})"
+        )
+    searched = bool(equations.solvers)
     refuse_if_any(what, {"has an algebraic loop, whose signals are searched for": searched})
+    for function in described_functions(compiled.schedule, equations.cut):
+        raise CompileError(
+            f"'{what}' cannot be exported: a loop in the {function} may take more passes than are "
+            "written out, and there is nobody to call the function then: take a fixed number of "
+            f"passes, 'for _ in range({_ENOUGH})' without 'break', instead of 'while' or a "
+            "search of SciPy, and scipy.integrate.fixed_quad instead of quad; "
+            "nlctl.input_output_response runs it as it is"
+        )
 
 
 def check_integers(compiled: Compiled, p: np.ndarray, what: str) -> None:

@@ -47,7 +47,7 @@ def _switches(node: Expr) -> bool:
         return moves and not _of_truths(node) and not _is_of_infinity(node)
     return (
         node.op in _OF_FIRSTS
-        or _rooted(node) is not None
+        or number_rooted(node) is not None
         or (at_integers(node) and not _is_quotient(node.args[0]))
         or (node.op in _OF_SECONDS and node.args[1].varies)
     )
@@ -70,7 +70,7 @@ def at_integers(node: Expr) -> bool:
     return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
 
 
-def _rooted(node: Expr) -> Expr | None:
+def number_rooted(node: Expr) -> Expr | None:
     """Return what a root is the size of, as sqrt(z z) is that of z; None of any other number."""
     square = node.args[0] if node.op in ("sqrt", "power") else node
     return square.args[0] if square is not node and is_square(square) else None
@@ -122,7 +122,7 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
         return _signed(graph, args[0])
     if op in _OF_SECONDS:
         return _signed(graph, args[1])
-    if (rooted := _rooted(condition)) is not None:
+    if (rooted := number_rooted(condition)) is not None:
         return rooted
     return _at_integers(graph, _counted(graph, condition))
 
@@ -206,7 +206,7 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
             return graph.op("sub", *pair[::step])
     for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:
-            squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
+            squares = [_number_rooted_root(graph, root), graph.op("mul", other, other)]
             return graph.op("sub", *squares[::step])
     return graph.op("sub", a, b)
 
@@ -233,7 +233,7 @@ def _inverse(op: str, level: Expr) -> float | None:
         return None
 
 
-def _square_of_root(graph: Graph, root: Expr) -> Expr:
+def _number_rooted_root(graph: Graph, root: Expr) -> Expr:
     args = [graph.number(arg) for arg in root.args]
     if root.op == "sqrt":
         return args[0]

@@ -243,8 +243,8 @@ class Compiled(Reading, StandIn):
             x0, u0 = x0.states, x0.inputs if u0 is None else u0
         system = self.system
         n, m, given = system.nstates or 0, system.ninputs or 0, self.schedule.ninputs
-        jacobians.tell_of_differences(self)
         directions = np.eye(n + given + length(self.program.layout), n + m)
+        jacobians.tell_of_differences(self, self.parameter_vector(params))
         derivatives = jacobians.jacobian(self, x0, u0, t, params, directions)
         rates, outputs, dt = derivatives["dx"], derivatives["y"], system.dt
         if self.program.sampled:
@@ -287,8 +287,7 @@ class Compiled(Reading, StandIn):
             the equations, by a record's `derived`.
         """
         places = jacobians.float_parameters(self)
-        jacobians.tell_of_differences(self)
-        self.parameter_vector(params)  # blocks have the run's parameters then
+        jacobians.tell_of_differences(self, self.parameter_vector(params))  # blocks have these
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))
         for k, name in enumerate(parameters):
@@ -323,8 +322,9 @@ class Compiled(Reading, StandIn):
                 )
         result = np.empty(size or 0)
         u = np.append(u, np.zeros(self.schedule.ninputs - u.size))  # inputs stand still
-        self.native[which](float(t), x, u, self.parameter_vector(params), result, *more)
-        cut, u = self.equations.cut, u[: self.system.ninputs or 0]
+        p = self.parameter_vector(params)
+        self.native[which](float(t), x, u, p, result, *more)
+        cut, u = self.equations_with(p).cut, u[: self.system.ninputs or 0]
         if cut and np.isnan(result).any():  # a loop takes more passes than are written out
             return self.calling(cut)._call(which, size, t, x, u, params, *more)
         return result

@@ -14,7 +14,8 @@ import numpy as np
 from ..errors import CompileError, UsageError
 from .compiled import Compiled
 from .diagram.parameters import length
-from .jacobians import Tangent, check_assumed, differentiated_at, open_tangent, point_numbers
+from .jacobians import differentiated_at, open_tangent, point_numbers
+from .machine.evaluations import prepared_parameters
 
 _STEPS, _CLOSE = 50, 1e-12  # of Newton's method, for what leaves delays
 
@@ -41,16 +42,24 @@ class CutDiagram:
                 f"'{named[0]}': give its continuous part, or use nlctl.linearize, which has the "
                 "map over the common period of the clocks"
             )
-        self.compiled, self.t = compiled, t
+        self.t = t
         self.n, self.m = system.nstates or 0, system.ninputs or 0
         self.lines, self.noutputs = len(read.lines), system.noutputs or 0
         self.p = compiled.parameter_vector(params)
-        self.tangent: Tangent = open_tangent(compiled)
-        check_assumed(compiled, self.tangent, self.p)
-        self._rates, self._shown = compiled.native
-        rows = compiled.lowered.rows
-        self._dx, self._g, self._m = (np.empty(k) for k in (self.n, rows["g"], rows["m"]))
-        self._y = np.empty(self.noutputs + self.lines)
+        self._read(compiled)
+
+    def _read(self, compiled: Compiled) -> None:
+        """Take values and derivatives of a diagram."""
+        self.compiled, self.tangent = compiled, open_tangent(compiled, self.p)
+        self.code, self._c = prepared_parameters(compiled, self.p)
+
+    def _suffices(self, results: Mapping[str, np.ndarray]) -> bool:
+        """Whether enough passes of all loops are written out; if not, functions are called now."""
+        cut = self.tangent.equations.cut
+        if not cut or not any(np.isnan(part).any() for part in results.values()):
+            return True
+        self._read(self.compiled.calling(cut))
+        return False
 
     def delays(self, who: str) -> np.ndarray:
         """Return the delays (s), shape (lines,); refuse one that varies."""
@@ -68,17 +77,21 @@ class CutDiagram:
 
     def values(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> Any:
         """Return rates, outputs and what arrives, with `w` leaving the delays."""
-        given = np.concatenate([u, w, np.zeros(self.compiled.schedule.rates)])
-        state = np.array(x, dtype=float)
-        with np.errstate(all="ignore"):  # NaN is seen by who asks
-            self._rates(self.t, state, given, self.p, self._dx, self._g, self._m)
-            self._shown(self.t, state, given, self.p, self._y)
-        return self._dx.copy(), self._y[: self.noutputs].copy(), self._y[self.noutputs :].copy()
+        found = self._evaluated(x, u, w)
+        return found["dx"], found["y"][: self.noutputs], found["y"][self.noutputs :]
 
     def conditions(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Return the values of what the equations switch at."""
-        self.values(x, u, w)
-        return self._g.copy()
+        return self._evaluated(x, u, w)["g"]
+
+    def _evaluated(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the rates, the values of conditions, and the outputs."""
+        point = self.t, x, np.concatenate([u, w, np.zeros(self.compiled.schedule.rates)])
+        with np.errstate(all="ignore"):  # NaN is seen by who asks
+            dx, g, _ = self.code.values(self.code.rhs, "dx g m", point, self._c)
+            (y,) = self.code.values(self.code.out, "y", point, self._c)
+        found = {"dx": dx, "y": y}
+        return {**found, "g": g} if self._suffices(found) else self._evaluated(x, u, w)
 
     def derivatives(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> Derivatives:
         """Return the derivatives at a point, exactly."""
@@ -87,7 +100,9 @@ class CutDiagram:
         given = np.concatenate([u, w, np.zeros(self.compiled.schedule.rates)])
         columns = {"t": [self.t], "x": x, "u": given, "p": self.p}
         with np.errstate(all="ignore"):
-            found = differentiated_at(self.compiled, self.tangent, columns, np.eye(total, width))
+            found = differentiated_at(self.tangent, columns, np.eye(total, width))
+        if not self._suffices(found):
+            return self.derivatives(x, u, w)
         outputs = found["y"]
         return Derivatives(found["dx"], outputs[: self.noutputs], outputs[self.noutputs :])
 

@@ -39,7 +39,7 @@ def described(reading: Reading) -> str:
         f"  run it by    {USE}",
     ]
     if ct.isctime(system) and system.nstates:
-        why = inexact(reading)
+        why = inexact(reading.equations)
         how = "exact" if why is None else f"exact, with differences where {why}"
         lines.append(f"  Jacobian     {how}")
     lines += [f"  conditions   {line}" for line in _conditions(reading)]

@@ -111,8 +111,9 @@ def _around(cut: CutDiagram, at: object, inputs: object) -> Derivatives:
         at, inputs = at.states, at.inputs if inputs is None else inputs
     x = state_array(cut.compiled.system, at)
     u = cut.inputs(_WHO, "inputs", inputs)
-    tell_of_differences(cut.compiled)
-    return cut.derivatives(x, u, cut.leaving(x, u))
+    derivatives = cut.derivatives(x, u, cut.leaving(x, u))
+    tell_of_differences(cut.compiled, cut.p)
+    return derivatives
 
 
 def _checked(omega: object) -> np.ndarray:

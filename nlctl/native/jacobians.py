@@ -41,14 +41,12 @@ class Tangent:
     # for ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
     # pairs of an expression, None where it is 0, and its length
     rows: Mapping[str, Sequence[tuple[Expr | None, int]]]
-    # integer parameters for whose values this holds: place in the parameter vector, and value
-    assumed: Mapping[int, int]
+    equations: Equations  # of which it is the derivative
 
 
-def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
+def inexact(found: Equations, results: Sequence[str] = ("dx",)) -> str | None:
     """Return what derivatives of a diagram's results are taken by differences of, and why."""
     # None if all are exact.
-    found = reading.equations
     parts = [expr for name in results for expr, _ in found.pieces(name)]
     names = dict.fromkeys(node.data[0] for node in needed(parts) if node.op == "call")
     used = [found.calls[name] for name in names]
@@ -57,12 +55,9 @@ def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
     return ", and ".join(told) or None
 
 
-def tangent(reading: Reading) -> Tangent:
-    """Return a diagram's equations differentiated by states, inputs and parameters."""
-    return reading.cache.found(Tangent, lambda _: True, lambda: _tangent(reading))
-
-
-def _tangent(reading: Reading) -> Tangent:
+def tangent(reading: Reading, p: np.ndarray | None = None) -> Tangent:
+    """Return the equations of a parameter vector by states, inputs and parameters."""
+    # `p` is that of the diagram itself if left out.
     if reading.schedule.lines:
         delays = ", ".join(f"'{b.name}'" for b in supplied_blocks(reading.system, PAST))
         raise CompileError(
@@ -71,17 +66,19 @@ def _tangent(reading: Reading) -> Tangent:
             "nlctl.sampled(gain, dt, delay=...), which is exact; nlctl.frequency_response keeps "
             "them as they are"
         )
-    return _differentiated(reading)
+    return open_tangent(reading, p)
 
 
-def open_tangent(reading: Reading) -> Tangent:
+def open_tangent(reading: Reading, p: np.ndarray | None = None) -> Tangent:
     """Return the same where the transport delays are cut: what leaves them are further inputs."""
     # Behind the outputs follows what arrives at them.
-    return _differentiated(reading) if reading.schedule.lines else tangent(reading)
+    found = reading.equations if p is None else reading.equations_with(p)
+    return reading.cache.found(
+        Tangent, lambda known: known.equations is found, lambda: _differentiated(reading, found)
+    )
 
 
-def _differentiated(reading: Reading) -> Tangent:
-    found = reading.equations
+def _differentiated(reading: Reading, found: Equations) -> Tangent:
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
     n, m = reading.system.nstates or 0, reading.schedule.ninputs
     parts = needed([expr for name in names for expr, _ in found.pieces(name)])
@@ -93,7 +90,7 @@ def _differentiated(reading: Reading) -> Tangent:
         )
     starts = {"x": 0, "u": n, "p": n + m}
     rows = {name: along(found, name, starts) for name in names}
-    return Tangent(rows=rows, assumed=dict(found.graph.assumptions))
+    return Tangent(rows=rows, equations=found)
 
 
 def along(
@@ -130,38 +127,26 @@ def jacobian(
 ) -> dict[str, np.ndarray]:
     """Return the derivatives of the right-hand side and of the outputs along directions."""
     # Shapes: `directions` (nstates + inputs of the program + parameters, k).
-    system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
-    p = reading.parameter_vector(params)
-    check_assumed(reading, made, p)
+    system, t, p = reading.system, number("linearize", "t", t), reading.parameter_vector(params)
+    made = tangent(reading, p)
     u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
     u = np.append(u, np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
-    found, cut = differentiated_at(reading, made, columns, directions), reading.equations.cut
+    found, cut = differentiated_at(made, columns, directions), made.equations.cut
     if cut and any(np.isnan(part).any() for part in found.values()):
         calling = reading.calling(cut)  # a loop takes more passes there than are written out
-        tell_of_differences(calling)
+        tell_of_differences(calling, p)
         return jacobian(calling, x0, u0, t, params, directions)
     return found
 
 
-def check_assumed(reading: Reading, made: Tangent, p: np.ndarray) -> None:
-    """Refuse parameters for which the equations were not differentiated."""
-    for place, value in made.assumed.items():
-        if p[place] != value:
-            raise UsageError(
-                f"the equations of '{reading.system.name}' were differentiated for an integer "
-                f"parameter of {value}, which is {p[place]:g} now: compile again with "
-                "params={...}"
-            )
-
-
 def differentiated_at(
-    reading: Reading, made: Tangent, columns: Mapping[str, Any], directions: np.ndarray
+    made: Tangent, columns: Mapping[str, Any], directions: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return derivatives along directions at a point, given as t, x, u and p."""
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
-    searches = searches_of(reading.equations)
+    searches = searches_of(made.equations)
     count, found = directions.shape[1], {}
     for name, rows in made.rows.items():
         wanted = [e for e, _ in rows if e is not None]
@@ -193,10 +178,11 @@ def point_numbers(needs: str, count: int, what: str, given: object) -> np.ndarra
     return numbers
 
 
-def tell_of_differences(reading: Reading) -> None:
+def tell_of_differences(reading: Reading, p: np.ndarray) -> None:
     """Warn of derivatives that are not exact."""
-    names = ("dx", "y", *(r for r in reading.equations.results if r.startswith("sample")))
-    why = inexact(reading, names)
+    found = reading.equations_with(p)
+    names = ("dx", "y", *(r for r in found.results if r.startswith("sample")))
+    why = inexact(found, names)
     if why is not None:
         warnings.warn(
             f"derivatives of '{reading.system.name}' are differences where {why}, and exact "

@@ -398,6 +398,6 @@ def _sharpened(residual: Any, slope: Any, z: np.ndarray) -> np.ndarray:
 def _kinks(cut: CutDiagram, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> tuple[str, ...]:
     """Return what the equations switch at, at a point."""
     g = cut.conditions(x, u, w)
-    labels = row_labels(cut.compiled, cut.compiled.lowered.conditions)
+    labels = row_labels(cut.compiled, cut.code.lowered.conditions)
     near = np.abs(g[: len(labels)]) <= _AT_KINK * (1.0 + np.abs(np.concatenate([x, u, w])).max())
     return tuple(dict.fromkeys(" ".join(labels[i]).strip() for i in np.flatnonzero(near)))

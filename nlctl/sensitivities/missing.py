@@ -194,14 +194,14 @@ class _Run:
     @cached_property
     def _events(self) -> tuple[np.ndarray, list[tuple[str, str]]]:
         """What has happened to the diagram itself: when, and block and which."""
-        conditions, happened = self.compiled.equations.conditions, self.trajectory.happened
+        source, happened = self.differentiated.sides.source, self.trajectory.happened
+        conditions = source.equations.conditions
         labels = row_labels(self.compiled, conditions)
-        ordered = self.differentiated.sides.source.ordered
+        ordered = source.ordered
         labels = [*(labels[k] for k in ordered), *labels[len(ordered) :]]
         first = self.compiled.program.switching + conditions.rows
-        watching = len(self.differentiated.saltation.turning) + bool(
-            self.differentiated.sides.source.driven
-        )
+        watching = len(self.differentiated.saltation.turning) + bool(source.driven)
+        watching += self.differentiated.sides.watches
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):
             if first <= row < first + watching:

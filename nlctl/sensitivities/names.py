@@ -79,6 +79,7 @@ def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[Va
             continue
         if name not in parameters and name in states:
             raise unknown("parameter", name, [*parameters, f"{name}{_AT_START}"])
+        _check_float(compiled, name)
         full = name if name in parameters else find_name("parameter", name, parameters)
         place, owner = parameters[full]
         _check_moves(compiled, owner, full)
@@ -92,6 +93,16 @@ def parameters_and_states(given: Mapping[str, Any]) -> tuple[dict[str, Any], dic
     """Return the parameters of some quantities, and the initial states."""
     states = {n.removesuffix(_AT_START): v for n, v in given.items() if n.endswith(_AT_START)}
     return {n: v for n, v in given.items() if not n.endswith(_AT_START)}, states
+
+
+def _check_float(compiled: Compiled, name: str) -> None:
+    """Refuse an integer, which does not change by a little."""
+    for slot in (s for slots in compiled.program.layout.values() for s in slots.values()):
+        if slot.name == name and slot.kind != "f":
+            raise ParameterError(
+                f"'{name}' is an integer in '{compiled.system.name}', no float: "
+                "write its value as 2.0 instead of 2 if it may lie between two integers"
+            )
 
 
 def _check_moves(compiled: Compiled, owner: Node, name: str) -> None:

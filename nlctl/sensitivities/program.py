@@ -181,15 +181,15 @@ class _Maker:
         source, places = self.source, self.places
         before, n, by = source.program, places.states, places.by
         owner = source.extended.owner
-        jumping = list(before.jumping)
+        jumping, guards = list(before.jumping), list(before.guards)
+        turning = list(self.saltation.at_turns())
         first = places.kept + self.sides.first_memory
         for i, _, _ in before.jumping:
-            jumping += [(i, n, places.kept), (i, places.grazing, places.arrived)]
-            jumping.append((i, first, first + len(before.memory)))
+            jumping += [(i, n, places.together), (i, places.grazing, places.arrived)]
         if self.sides.watches:
+            guards.insert(0, owner)  # a reset by what has jumped says more
             jumping.append((owner, n, places.last))
             jumping += [(owner, places.number, places.arrived)] if places.lines else []
-        turning, guards = list(self.saltation.at_turns()), list(before.guards)
         if turning:
             jumping += [(owner + 1, m, m + 1) for m in turning]
             jumping.append((owner + 1, first, first + len(before.memory)))
@@ -205,7 +205,7 @@ class _Maker:
             before,
             layout=source.extended.layout,
             switching=source.behind,
-            guards=(*guards, *([owner] if self.sides.watches else []), *[owner + 3] * places.lines),
+            guards=(*guards, *[owner + 3] * places.lines),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
         )
@@ -226,6 +226,8 @@ class _Maker:
         jumping = self.sides.watches or self.source.driven or self.places.lines
         if equations.results.get("reset") or jumping:
             results["reset"] = self._resets()
+        if "sharp" in equations.results:  # derivatives are as narrow as the functions themselves
+            results["sharp"] = equations.results["sharp"]
         for name in equations.results:
             if name.startswith("sample"):
                 results[name] = self._samples(name)
@@ -287,8 +289,8 @@ class _Maker:
         ]
         rows = [apart for apart, _ in self.saltation.turning]
         rows += [self.sides.driven] if source.driven else []
-        rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
+        rows += source.guards
         rows += self.saltation.returning.guards
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 

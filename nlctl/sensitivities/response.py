@@ -61,7 +61,7 @@ def sensitivity_response(
     params : mapping, optional
         Overrides by qualified name.
     method : str or Tableau, optional
-        Of machine code, as in `nlctl.input_output_response`; "taylor" is not for derivatives.
+        Of machine code, as in `nlctl.input_output_response`.
     rtol, atol : float, optional
         Tolerances, for states and for derivatives times the size of what they are taken by.
     max_steps : int, optional
@@ -87,7 +87,8 @@ def sensitivity_response(
         If the diagram cannot be compiled, is in discrete time, or something in it has no
         derivative: a parameter that numbers follow from outside of the equations, one that says
         when samples are taken, a delay where one varies or has a history or where blocks are
-        sampled, an algebraic loop that jumps, a condition on a delayed signal.
+        sampled, an algebraic loop that jumps, a condition on a delayed signal, a memory that one
+        drives.
     ParameterError
         If a value is refused.
     DivergedError

@@ -50,14 +50,14 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
             f"'{compiled.system.name}' is in discrete time: derivatives of runs are for diagrams "
             "in continuous time; nlctl.sampled has blocks with a clock in these"
         )
-    cut = compiled.equations.cut
+    p = compiled.parameter_vector(run.params)
+    cut = compiled.equations_with(p).cut
     if cut and _alone(compiled, run).statistics.called:  # it takes more passes than are written out
         compiled = compiled.calling(cut)
     signals = observed_signals(compiled, run.of)
     quantities = varied_quantities(compiled, run.with_respect_to)
     u = input_array(compiled.system, run.inputs, run.times)
     x0 = state_array(compiled.system, run.initial_state)
-    p = compiled.parameter_vector(run.params)
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
@@ -95,7 +95,8 @@ def _compiled(
     for entry in entries:
         if entry.key == key and entry.holds_for(p):
             return entry.differentiated
-    why = inexact(compiled, tuple(compiled.equations.results))
+    equations = compiled.equations_with(p)
+    why = inexact(equations, tuple(equations.results))
     if why is not None:
         warnings.warn(
             f"derivatives of '{compiled.system.name}' are differences where {why}, and exact "

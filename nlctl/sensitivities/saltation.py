@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
+from ..expressions.dependence import reads
 from ..expressions.graph import Expr, Graph, needed
 from .branches import bounded
 from .causes import Cause, When, when_of
@@ -26,6 +27,7 @@ from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
+from .turns import DrivenMemories
 
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
@@ -98,31 +100,33 @@ class Saltation:
     ) -> list[SomeRows]:
         """Return what follows the states where a block jumps."""
         source, graph, places = self.source, self.source.graph, self.places
-        before = source.moving(source.flow, self.sides.kept(source.committed))
+        before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
         rows: dict[int, Expr] = {}
         for expr, size in states:
             rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
         rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
         later = self._after(rows, source.arriving)
-        pairs = [(e, new) for (e, _), new in zip(source.arriving, later, strict=True)]
+        earlier = self.sides.earlier([e for e, _ in source.arriving])
+        pairs = [*zip(earlier, later, strict=True)]
         # what is reset to where it has fallen has moved by as little as a step ends behind that
         atol = graph.leaf("p", source.extended.slot("atol").offset, None)
         sent = self._differ(pairs, graph.op("mul", graph.const(_UNSEEN), atol))
-        when = self._when_fallen(guards)
-        together = graph.op("lt", self.sides.margin, graph.const(0.0))
+        when, together = self._when_reset(guards)
         broken, after = graph.op("or", when.grazes, together), []
         for j, move in enumerate(when.moves):
             after += self._jumped(j, rows, before, behind, move, broken)
+        sides = self.sides.now[: len(self.sides.sides)]
+        after += self._after(rows, sides)
+        for m, kept in self.sides.memories.items():
+            (stands,) = self.sides.kept([rows.get(m, kept)])
+            after.append((graph.leaf("x", m, None) if m in source.switched else stands, 1))
         after.append((self._first(places.grazing, when.grazes), 1))
         moves = self.returning.counts(when, sent)
         after.append((self._lost_in_delay(moves), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
-        earlier = [e for e, _ in source.arriving]
-        after += self.returning.sent(moves, earlier, later, when.moves)
-        kept = {m: rows.get(m, kept) for m, kept in self.sides.memories.items()}
-        return [*after, *((e, 1) for e in self.sides.kept(list(kept.values())))]
+        return [*after, *self.returning.sent(moves, earlier, later, when.moves)]
 
     def at_arrival(self) -> list[SomeRows]:
         """Return what follows the states where a jump leaves a delay."""
@@ -192,6 +196,13 @@ class Saltation:
             touched = graph.op("or", touched, touch)
         return self._first(self.places.grazing, touched)
 
+    @cached_property
+    def _turns(self) -> DrivenMemories:
+        """Derivatives of memories that are driven."""
+        return DrivenMemories(
+            source=self.source, sides=self.sides, places=self.places, seeds=self.seeds
+        )  # fmt: skip
+
     def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
         """Return the derivative of an expression in a direction."""
         return self.source.slopes([level], seed)
@@ -200,7 +211,7 @@ class Saltation:
         """Return what derivatives of memories become where these turn, by their states."""
         places, driven = self.places, self.source.driven
         return {
-            places.derivative(j) + m: self._kept(j, m, at_turn=True)
+            places.derivative(j) + m: self._turns.kept(j, m, at_turn=True)
             for j in range(places.by)
             for m in driven
         }
@@ -219,45 +230,7 @@ class Saltation:
         for _, size in self.source.flow:
             pieces.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return rows_replaced(graph, pieces, {m: self._kept(j, m) for m in self.source.driven})
-
-    def _kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
-        """Return the derivative of a memory, which is integrated only while it is not driven."""
-        # A step ends a little behind where it has reversed.
-        graph = self.source.graph
-        kept = self.sides.memories[m]
-        become = self.source.driven[m]
-        (change,) = self.change(become, self.seeds[j])
-        derivative = graph.const(0.0) if change is None else change
-        if at_turn and change is not None:
-            late, flowing = self._late(become), list(self.source.flow)
-            for i in range(self.places.by):
-                rates = self.source.changes([e for e, _ in self.source.flow], self.seeds[i])
-                sizes = (size for _, size in self.source.flow)
-                flowing += zip(rates, sizes, strict=True)
-            forward = self.source.time(flowing, delays_move=False)
-            (rate,) = self.source.slopes([change], forward)
-            if rate is not None:
-                derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
-        (derivative,) = self.sides.kept([derivative])
-        moved = graph.op("ne", graph.leaf("x", m, None), kept)
-        integrated = graph.leaf("x", self.places.derivative(j) + m, None)
-        return graph.op("select", moved, derivative, integrated)
-
-    def _late(self, become: Expr) -> Expr:
-        """Return how long ago what drives a memory has reversed, 0 at a break."""
-        # Where it turns is located by a difference of rates: a little too early or too late.
-        graph, source = self.source.graph, self.source
-        zero = graph.const(0.0)
-        forward = source.time(source.flow, delays_move=False)
-        (rate,) = self.source.slopes([become], forward)
-        (bend,) = self.source.slopes([rate or zero], forward)
-        if bend is None:
-            return zero
-        late = graph.op("div", rate or zero, bend)
-        longest = graph.leaf("p", source.extended.slot("late").offset, None)
-        recent = graph.op("le", graph.op("absolute", late), longest)
-        return graph.op("select", recent, late, zero)
+        return rows_replaced(graph, pieces, {m: self._turns.kept(j, m) for m in self.source.driven})
 
     def _jumped(
         self,
@@ -271,7 +244,8 @@ class Saltation:
         """Return R' (S + f- t*') - f+ t*' of all states."""
         graph = self.source.graph
         arriving, of = self._arriving(j, before, move)
-        changes = dict(zip(rows, self._through(list(rows.values()), of, move), strict=True))
+        exprs = self.source.with_states(list(rows.values()), self._switched)
+        changes = dict(zip(rows, self._through(exprs, of, move), strict=True))
         state, left = graph.joined(arriving), graph.joined(list(behind))
         jumped = []
         for k in range(self.places.states):
@@ -302,10 +276,9 @@ class Saltation:
         if not driven and not source.catching:
             return {}
         becomes = list(driven.values())
-        earlier = dict(zip(driven, replaced_parts(graph, becomes, self.sides.before), strict=True))
-        now = {m: graph.node("leaf", data=(_NOW, m, 0), size=None, varies=True)
-               for m in source.switched} | source.catching  # fmt: skip
-        after = [*source.with_states(becomes, {**now, **earlier}), *source.catching.values()]
+        earlier = dict(zip(driven, self._driving, strict=True))
+        now = {**self._switched, **source.catching, **earlier}
+        after = [*source.with_states(becomes, now), *source.catching.values()]
         _, of = self._arriving(j, before, move)
         changes = self._through(after, of, move)
         left = graph.joined(list(behind))
@@ -317,6 +290,21 @@ class Saltation:
             still = graph.leaf("x", self.places.derivative(j) + m, None)
             rows[m] = graph.op("select", self._switches(m), change, still)
         return rows
+
+    @property
+    def _switched(self) -> dict[int, Expr]:
+        """What stands for memories that switch, as they are now, by their states."""
+        graph = self.source.graph
+        return {
+            m: graph.node("leaf", data=(_NOW, m, 0), size=None, varies=True)
+            for m in self.source.switched
+        }
+
+    @cached_property
+    def _driving(self) -> list[Expr]:
+        """What has driven memories until something has jumped."""
+        becomes = list(self.source.driven.values())
+        return replaced_parts(self.source.graph, becomes, self.sides.before)
 
     def _switches(self, m: int) -> Expr:
         """Return whether a memory has just become another."""
@@ -357,8 +345,8 @@ class Saltation:
         # First they are what has driven them until then.
         driven = self.source.driven
         return {
-            m: self.source.with_states([become], {**rows, m: become})[0]
-            for m, become in driven.items()
+            m: self.source.with_states([become], {**rows, m: earlier})[0]
+            for (m, become), earlier in zip(driven.items(), self._driving, strict=True)
         }
 
     def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
@@ -399,11 +387,7 @@ class Saltation:
     def _when_left(self, jumps: Expr) -> When:
         """Return how the time moves at which sides have been left; a clock's does not."""
         graph = self.source.graph
-        last = graph.leaf("x", self.places.last, None)
-        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
-        recent = graph.op("mul", graph.const(2.0), self._rounding)
-        free = graph.op("and", graph.op("gt", ago, recent), jumps)
-        causes = []
+        free, causes = graph.op("and", self._alone, jumps), []
         for side in self.sides.sides:
             for k in range(side.rows):
                 kept, now, level, extent = (
@@ -415,6 +399,38 @@ class Saltation:
                 causes += [cause] if rate is not None else []
         return when_of(graph, causes, self.places.by, self._rounding)
 
+    @property
+    def _alone(self) -> Expr:
+        """Whether neither a clock nor a block has made something jump right now."""
+        graph = self.source.graph
+        last = graph.leaf("x", self.places.last, None)
+        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
+        return graph.op("gt", ago, graph.op("mul", graph.const(2.0), self._rounding))
+
+    def _when_reset(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
+        """Return how the time moves at which a block jumps, and whether two causes differ."""
+        # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
+        # or by what was sampled right now: then that says how the time moves.
+        graph, source = self.source.graph, self.source
+        earlier, fell = self.sides.earlier(guards), graph.const(False)
+        for guard in earlier:
+            sampled = reads([guard], "x", source.program.sampled)
+            fallen = graph.op("lt", guard, graph.const(0.0))
+            fell = graph.op("or", fell, graph.op("and", self._alone, fallen) if sampled else fallen)
+        by_itself, by_jumps = self._when_fallen(earlier), self._when_left(graph.const(True))
+
+        def either(one: Expr, other: Expr) -> Expr:
+            return graph.op("select", fell, one, other)
+
+        left = graph.op("lt", self.sides.margin, graph.const(0.0))
+        when = When(
+            moves=[either(*pair) for pair in zip(by_itself.moves, by_jumps.moves, strict=True)],
+            grazes=either(by_itself.grazes, by_jumps.grazes),
+            apart=either(by_itself.apart, by_jumps.apart),
+            happens=either(by_itself.happens, by_jumps.happens),
+        )  # fmt: skip
+        return when, either(left, by_jumps.apart)
+
     def _when_fallen(self, guards: Sequence[Expr]) -> When:
         """Return how the time moves at which a guard has fallen: the nearest to 0."""
         graph = self.source.graph
@@ -423,7 +439,7 @@ class Saltation:
         for guard in guards:
             guard = bounded(graph, guard)
             size = graph.op("absolute", guard)
-            rate, cause = self._met(yes, guard, size, self.source.flow)
+            rate, cause = self._met(yes, guard, size, self.sides.flow_before)
             if rate is not None:
                 fallen = graph.op("lt", guard, graph.const(0.0))
                 ago = graph.op("absolute", graph.op("div", guard, rate))

@@ -109,7 +109,7 @@ def sides_of(source: EquationParts, first: int) -> KeptSides:
     """Return the sides of all jumps of a diagram."""
     graph = source.graph
     jumps = [(node, node.op, node.args) for node in source.jumps]
-    jumps += [(None, "ge", (expr, graph.const(0.0))) for expr in _of_memories(source)]
+    jumps += [(None, "ge", (expr, graph.const(0.0))) for expr in source.of_memories]
     sizes = [next((a.size for a in args if a.size), None) for _, _, args in jumps]
     behind = first + sum(size or 1 for size in sizes)
     memories = {m: graph.leaf("x", behind + k, None) for k, m in enumerate(source.program.memory)}
@@ -127,17 +127,6 @@ def sides_of(source: EquationParts, first: int) -> KeptSides:
         if node is not None:
             before[node] = there.value
     return KeptSides(source=source, sides=tuple(sides), memories=memories, before=before)
-
-
-def _of_memories(source: EquationParts) -> list[Expr]:
-    """Return the switching functions of the blocks whose memories jump."""
-    nodes = source.extended.schedule.nodes
-    jumping_blocks = {
-        i for i, node in enumerate(nodes) for m in source.switched
-        if node.state_offset <= m < node.state_offset + node.size
-    }  # fmt: skip
-    pairs = zip(source.owners, source.switching, strict=True)
-    return [expr for i, expr in pairs if i in jumping_blocks and expr.varies]
 
 
 def _timed(exprs: Sequence[Expr]) -> set[Expr]:

@@ -123,13 +123,25 @@ class EquationParts:
                 "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
                 "on both sides; put a lag into the loop"
             )
-        roots = self._flowing
+        # what jumps may also make a memory switch, or a guard fall
+        roots = [*self._flowing, *self.of_memories, *self.guards]
         return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
 
     @property
     def _flowing(self) -> list[Expr]:
         """What a run is made of between its events."""
         return [*(e for e, _ in (*self.flow, *self.arriving)), *self.driven.values()]
+
+    @cached_property
+    def of_memories(self) -> list[Expr]:
+        """The switching functions of the blocks whose memories jump."""
+        nodes = self.extended.schedule.nodes
+        jumping_blocks = {
+            i for i, node in enumerate(nodes) for m in self.switched
+            if node.state_offset <= m < node.state_offset + node.size
+        }  # fmt: skip
+        pairs = zip(self.owners, self.switching, strict=True)
+        return [expr for i, expr in pairs if i in jumping_blocks and expr.varies]
 
     @cached_property
     def kinks(self) -> list[Expr]:

@@ -75,3 +75,52 @@ def test_what_three_functions_cannot_say_is_refused(what):
     )
     with pytest.raises(CompileError, match=what):
         export_equations(loop)
+
+
+def root_by(passes):
+    """x' = -y, y = cos(y) + x / 10 by Newton's method, until it stands still or so many times."""
+
+    def step(y, x):
+        return (y - np.cos(y) - 0.1 * x) / (1 + np.sin(y))
+
+    def until_still(t, x, u, p):
+        y = 0.5
+        while abs(step(y, x[0])) > 1e-13:
+            y = y - step(y, x[0])
+        return [-y]
+
+    def so_often(t, x, u, p):
+        y = 0.5
+        for _ in range(passes):
+            y = y - step(y, x[0])
+        return [-y]
+
+    update = so_often if passes else until_still
+    return ct.nlsys(update, None, inputs=0, outputs=["x"], states=["x"], name="s")
+
+
+EXPORTS = {
+    "equations": lambda system: export_equations(system),
+    "controller": lambda system: nlctl.export.export_controller(
+        nlctl.interconnect([system], inputs=[], outputs=["x"], name="loop"), "s", dt=0.1,
+        method="euler",
+    ),
+    "fmu": lambda system: nlctl.export.fmi.reading.read_model(system, {}, {}, "s", 1.0, 1e-6),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", EXPORTS)
+def test_a_loop_without_a_fixed_number_of_passes_is_refused_and_one_with_is_written(kind):
+    """Nobody could call the function where the passes that are written out do not suffice."""
+    with pytest.raises(CompileError, match=r"update function of block 's.*for _ in range\(20\)"):
+        EXPORTS[kind](root_by(None))
+    assert EXPORTS[kind](root_by(20)).lowered.cut == frozenset()
+
+
+@pytest.mark.ci
+def test_a_loop_of_so_many_passes_is_in_c_what_it_is_in_python(tmp_path):
+    system = root_by(20)
+    points = [(0.0, np.array([x]), np.zeros(1)) for x in (-20.0, -3.0, 0.0, 1.0, 7.0)]
+    results = evaluated(tmp_path, export_equations(system), points)
+    for (t, x, _), (dx, _) in zip(points, results, strict=True):
+        assert dx == pytest.approx(system.dynamics(t, x, []), abs=1e-13)

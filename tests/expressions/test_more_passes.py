@@ -1,5 +1,7 @@
 """Loops that take more passes than are written out: the function is called, and it is said."""
 
+import warnings
+
 import control as ct
 import numpy as np
 import pytest
@@ -182,3 +184,64 @@ def test_what_is_called_says_what_to_do(remedy):
     compiled = nlctl.compile(loop(lambda t, x, u, p: [-function(x)]))
     (line,) = [line for line in str(compiled).splitlines() if line.startswith("  as it stands")]
     assert remedy in line
+
+
+def counted_root(x, params):
+    """Small steps towards y = cos(y) + k x, so many at most."""
+    y = 0.0
+    for _ in range(int(params["n"])):
+        step = 0.05 * (y - np.cos(y) - params["k"] * x)
+        if abs(step) < 1e-13:
+            break
+        y = y - step
+    return y
+
+
+def counted_loop(n):
+    return ct.nlsys(
+        lambda t, x, u, params: [u[0] - counted_root(x[0], params)], None, inputs=["u"],
+        outputs=["x"], states=["x"], params={"n": n, "k": 0.1}, name="s",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("here", "there"), [(10, 200), (200, 10)])
+def test_whether_passes_suffice_is_asked_of_the_integers_of_the_call(here, there):
+    """All passes of 10 are written out, of 200 not; derivatives by differences of the function."""
+    params, h = {"n": there, "k": 0.1}, 1e-5
+    compiled = nlctl.compile(counted_loop(here))
+    root = counted_root(1.0, params)
+    assert compiled.dynamics(0.0, [1.0], [0.0], params=params) == pytest.approx([-root], abs=1e-13)
+    slope = (counted_root(1.0 + h, params) - counted_root(1.0 - h, params)) / (2 * h)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", errors.InexactWarning)
+        linear = compiled.linearize([1.0], [0.0], params=params)
+        by_k = compiled.parameter_jacobian(["s.k"], [1.0], [0.0], params=params)[0]
+        point = nlctl.find_operating_point(compiled, [0.5], 0.3, params=params)
+        response = nlctl.frequency_response(compiled, [2.0], at=[1.0], params=params)
+        given = {"initial_state": [1.0], "params": params}
+        made = nlctl.sensitivity_response(compiled, [0, 1], 0.0, with_respect_to="s.k", **given)
+    assert linear.A[0, 0] == pytest.approx(-slope, abs=1e-8)
+    assert by_k[0, 0] == pytest.approx(-slope / 0.1, abs=1e-7)  # of k x, by x = 1 and k = 0.1
+    assert counted_root(point.states[0], params) == pytest.approx(0.3, abs=1e-9)
+    assert response.frdata[0, 0, 0] == pytest.approx(1 / (2j + slope), abs=1e-8)
+    ends = [
+        nlctl.input_output_response(
+            compiled, [0, 1], initial_state=[1.0], params=params | {"k": k}, rtol=1e-11, atol=1e-12
+        ).states[0, -1]
+        for k in (0.1 - 1e-4, 0.1 + 1e-4)
+    ]
+    assert not made.missing
+    assert made["x", "s.k"][-1] == pytest.approx((ends[1] - ends[0]) / 2e-4, abs=1e-6)
+
+
+def test_a_function_that_other_integers_alone_make_opaque_is_named_in_the_log(caplog):
+    """The first machine code that is made is that of other integers than the diagram's."""
+
+    def update(t, x, u, params):
+        return [-x[0] * (float(str(float(x[0]))) if params["n"] > 1 else 1.0)]
+
+    system = ct.nlsys(update, None, inputs=0, outputs=["x"], states=["x"], params={"n": 1},
+                      name="s")  # fmt: skip
+    response = nlctl.input_output_response(system, [0, 1], initial_state=[1.0], params={"n": 2})
+    assert response.states[0, -1] == pytest.approx(0.5, abs=1e-6)  # x' = -x^2
+    assert "the update function of block 's' is called back in Python" in caplog.text

@@ -282,6 +282,18 @@ def test_names(of, by, error, match):
         nlctl.sensitivity_response(jumping_rate(), [0, 1], of=of, with_respect_to=by)
 
 
+def test_an_integer_is_no_float():
+    """A parameter that is written as 2 is an integer: that is said, and what to write."""
+    plant = ct.nlsys(lambda t, x, u, p: [-p["a"] * x[0]], None, inputs=0, outputs=["x"],
+                     states=["x"], params={"a": 2}, name="plant")  # fmt: skip
+    with pytest.raises(nlctl.errors.ParameterError, match="is an integer"):
+        nlctl.sensitivity_response(plant, [0, 1], with_respect_to=["plant.a"])
+    made = nlctl.sensitivity_response(
+        plant, [0, 1], initial_state=[1.0], params={"a": 2.0}, with_respect_to=["plant.x(0)"]
+    )
+    assert made["x", "plant.x(0)"][-1] == pytest.approx(np.exp(-2), abs=1e-8)
+
+
 def test_names_of_a_response():
     """Labels of a response are looked up; a table has a column for each derivative."""
     made = nlctl.sensitivity_response(jumping_rate(), [0, 1], with_respect_to="plant.p")

@@ -83,8 +83,9 @@ def fmu(
     Raises
     ------
     CompileError
-        If an FMU cannot say it: functions that are called, a search for signals of an algebraic
-        loop, transport delays, ideal relays, jitter of a clock, discrete time.
+        If an FMU cannot say it: functions that are called, loops without a fixed number of
+        passes, a search for signals of an algebraic loop, transport delays, ideal relays, jitter
+        of a clock, discrete time.
     ParameterError
         If a number is out of its bounds, a name is none in C, or there is no such folder.
     UnknownNameError

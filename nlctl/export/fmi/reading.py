@@ -36,8 +36,8 @@ def read_model(
     """Return what an FMU of a diagram is made of."""
     compiled = native.compile(diagram)
     system, what, program = compiled.system, str(compiled.system.name), compiled.program
-    _check(compiled, what)
     p = compiled.parameter_vector(params)
+    _check(compiled, what, p)
     start, lowered = state_of(system, initial_state), compiled.lowered
     check_integers(compiled, p, what)
     happenings = _happenings(compiled, p, stop_time, what)
@@ -55,9 +55,9 @@ def read_model(
     )  # fmt: skip
 
 
-def _check(compiled: Compiled, what: str) -> None:
+def _check(compiled: Compiled, what: str, p: np.ndarray) -> None:
     """Refuse what the C of an FMU cannot say."""
-    check_written_out(compiled, what)
+    check_written_out(compiled, what, p)
     is_continuous = ct.isctime(compiled.system)
     refuse_if_any(what, {
         "is in discrete time; put it into a diagram by nlctl.sampled": not is_continuous,

@@ -106,9 +106,9 @@ def web_program(
     UsageError
         If Zig is not installed.
     CompileError
-        If the module cannot hold it: functions that are called, a search for signals of an
-        algebraic loop, transport delays, discrete time, functions that JavaScript lacks, or more
-        memory than 64 MiB.
+        If the module cannot hold it: functions that are called, loops without a fixed number of
+        passes, a search for signals of an algebraic loop, transport delays, discrete time,
+        functions that JavaScript lacks, or more memory than 64 MiB.
     ParameterError
         If the run with these parameters does not reach its last time, or a value is refused.
 
@@ -122,10 +122,11 @@ def web_program(
     """
     check_linker()
     compiled, what = native.compile(diagram), str(diagram.name)
-    _check(compiled, what)
+    p = compiled.parameter_vector(params)
+    _check(compiled, what, p)
     grid = np.asarray(times, dtype=float)
     given: dict[str, Any] = {k: v for k, v in (("rtol", rtol), ("atol", atol)) if v is not None}
-    p, start = compiled.parameter_vector(params), state_array(compiled.system, initial_state)
+    start = state_array(compiled.system, initial_state)
     u = np.ascontiguousarray(input_array(compiled.system, inputs, grid))
     settings = Settings(**given, max_steps=1_000_000_000)
     run = _laid_out(compiled, grid, u, start, p, settings)
@@ -150,9 +151,9 @@ def web_program(
     )  # fmt: skip
 
 
-def _check(compiled: native.Compiled, what: str) -> None:
+def _check(compiled: native.Compiled, what: str, p: np.ndarray) -> None:
     """Refuse what a module cannot hold."""
-    check_written_out(compiled, what)
+    check_written_out(compiled, what, p)
     reasons = {
         "is in discrete time": not ct.isctime(compiled),
         "has transport delays, whose past has no bound on a page": bool(compiled.schedule.lines),

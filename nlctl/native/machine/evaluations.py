@@ -126,7 +126,7 @@ def machine(
 def _hint(reading: Reading, code: Machine) -> None:
     """Say which functions take the time of Python, and at which line that is decided."""
     for name in code.called_back:
-        call = reading.equations.calls[name]
+        call = code.lowered.calls[name]
         _LOG.warning(
             "hint: the %s function of block '%s' is called back in Python, so runs are no faster "
             "than python-control's: %s",

@@ -1,0 +1,190 @@
+"""Memories that turn at corners, and relays and resets that something else makes switch."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+from nlctl.errors import CompileError
+
+A, P, R = 1.0, 0.7, 1.3  # height and place of a corner, and a rate
+
+
+def source(output, params, rate=None):
+    """Signals of t and of x = rate t."""
+    return ct.nlsys(
+        lambda t, x, u, p: [p[rate] if rate else 1.0], output, inputs=0, outputs=["u"],
+        states=["x"], params=params, name="source",
+    )  # fmt: skip
+
+
+def integral(inp="v"):
+    return ct.nlsys(
+        lambda t, x, u, p: [u[0]], lambda t, x, u, p: [x[0]], inputs=[inp], outputs=["y"],
+        states=["y"], name="integral",
+    )  # fmt: skip
+
+
+CORNERS = {
+    "abs of t": lambda t, x, u, p: [p["A"] - np.abs(t - p["P"])],
+    "abs": lambda t, x, u, p: [p["A"] - np.abs(x[0] - p["P"])],
+    "min": lambda t, x, u, p: [np.minimum(x[0] - p["P"], p["P"] - x[0]) + p["A"]],
+    "max": lambda t, x, u, p: [p["A"] - np.maximum(x[0] - p["P"], p["P"] - x[0])],
+    "where": lambda t, x, u, p: [
+        np.where(x[0] > p["P"], p["P"] - x[0], x[0] - p["P"]) + p["A"]
+    ],
+    "sign": lambda t, x, u, p: [p["A"] - np.sign(x[0] - p["P"]) * (x[0] - p["P"])],
+    "root": lambda t, x, u, p: [p["A"] - np.sqrt((x[0] - p["P"]) ** 2)],
+    "remainder": lambda t, x, u, p: [p["A"] - np.abs(np.mod(x[0] - p["P"] + 2, 4) - 2)],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
+@pytest.mark.parametrize("law", CORNERS)
+def test_play_that_turns_at_a_corner(law, method):
+    """v = A - c from t = P on, wherever that is, until u has fallen by 2 c."""
+    gap = nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3)
+    parts = {"source": source(CORNERS[law], {"A": A, "P": P}), "gap": gap, "integral": integral()}
+    loop = nlctl.interconnect(parts, outputs=["v", "y"])
+    by = ["source.A", "source.P", "gap.c_r", "gap.c_l"]
+    made = nlctl.sensitivity_response(
+        loop, [0, 0.9, 1.2, 1.5], initial_state={"gap.memory": -0.1}, with_respect_to=by,
+        method=method,
+    )  # fmt: skip
+    assert not made.missing
+    assert made.values[0] == pytest.approx([A - P - 0.3, A - 0.3, A - 0.3, A - 0.8 + 0.3])
+    slopes = [[1, 1, 1], [0, 0, 1], [-1, -1, 0], [0, 0, -1]]
+    for name, expected in zip(by, slopes, strict=True):
+        assert made["v", name][1:] == pytest.approx(expected, abs=1e-7)
+    # y' by P is -1 while v is driven, then 0
+    assert made["y", "source.P"][2] - made["y", "source.P"][1] == pytest.approx(0, abs=1e-7)
+    assert made["y", "source.A"][2] - made["y", "source.A"][1] == pytest.approx(0.3, abs=1e-7)
+
+
+JUMPS = {
+    "of t": (lambda t, x, u, p: [np.where(t > p["P"], p["h"], -p["h"])], None),
+    "of a state": (lambda t, x, u, p: [np.where(x[0] > p["P"], p["h"], -p["h"])], "R"),
+}
+
+
+@pytest.mark.parametrize("kind", JUMPS)
+@pytest.mark.parametrize("actuator", ["relay", "Preisach"])
+def test_what_switches_as_its_input_jumps(actuator, kind):
+    """y' = -1 up to T and 1 behind it, however far the input jumps: y = t - 2 T."""
+    law, rate = JUMPS[kind]
+    relay = {"relay": nlctl.Relay(on=0.4, off=-0.5), "Preisach": nlctl.actuators.Preisach()}
+    parts = {"source": source(law, {"P": P, "h": 2.0, "R": R}, rate), "act": relay[actuator]}
+    loop = nlctl.interconnect(parts | {"integral": integral()}, outputs=["y"])
+    by = ["source.P", "source.h", "source.R"]
+    made = nlctl.sensitivity_response(loop, [0, 0.3, 1.0], with_respect_to=by)
+    T, over = (P, 1.0) if rate is None else (P / R, R)
+    assert not made.missing
+    assert made.values[0, -1] == pytest.approx(1 - 2 * T)
+    assert made["y", "source.P"] == pytest.approx([0, 0, -2 / over], abs=1e-8)
+    assert made["y", "source.h"] == pytest.approx([0, 0, 0], abs=1e-8)
+    by_rate = 0.0 if rate is None else 2 * P / R**2
+    assert made["y", "source.R"] == pytest.approx([0, 0, by_rate], abs=1e-6)
+
+
+@nlctl.record
+class Tank:
+    """Fills at a rate, and is emptied to a where it reaches a level."""
+
+    a: float = nlctl.param(0.05, unit="1", meaning="level behind")
+    q: float = nlctl.param(1.0, unit="1/s", meaning="rate")
+
+    inputs, outputs, states, feedthrough = ("level",), ("h",), ("h",), False
+
+    @staticmethod
+    @nlctl.equation
+    def update(t, x, u, p):
+        return (p.q,)
+
+    @staticmethod
+    @nlctl.equation
+    def output(t, x, u, p):
+        return (x[0],)
+
+    @staticmethod
+    @nlctl.equation
+    def guard(t, x, u, p):
+        return (u[0] - x[0],)
+
+    @staticmethod
+    @nlctl.equation
+    def reset(t, x, u, p):
+        return (p.a,)
+
+
+def level(output, inputs, params):
+    return ct.nlsys(
+        None, output, inputs=inputs, outputs=["level"], params=params, name="rule"
+    )  # fmt: skip
+
+
+def by_time():
+    """The level falls at T."""
+    rule = level(lambda t, x, u, p: [np.where(t > p["T"], 0.2, 5.0)], [], {"T": 0.6})
+    return [rule], {"rule.T": 1.0}, 0.6
+
+
+def by_crossing():
+    """The level falls where x = R t is P."""
+    rule = level(lambda t, x, u, p: [np.where(u[0] > p["T"], 0.2, 5.0)], ["u"], {"T": P})
+    moving = source(lambda t, x, u, p: [x[0]], {"R": R}, "R")
+    return [rule, moving], {"rule.T": 1 / R, "source.R": -P / R**2}, P / R
+
+
+def by_clock():
+    """The level is computed every 0.3 s, and is below h first at 0.6 s."""
+    rule = level(lambda t, x, u, p: [p["L"] - 4 * u[0]], ["h"], {"L": 2.0})
+    return [nlctl.sampled(rule, 0.3)], {"rule.L": 0.0}, 0.6
+
+
+def by_relay():
+    """The level falls where a relay switches, at the time that is its threshold."""
+    relay = nlctl.block(nlctl.Relay(on=0.6, off=-0.4), "relay", inputs=["u"], outputs=["v"])
+    rule = level(lambda t, x, u, p: [2.0 - p["g"] * u[0]], ["v"], {"g": 1.8})
+    moving = source(lambda t, x, u, p: [x[0]], {"R": 1.0})
+    return [rule, relay, moving], {"relay.on": 1.0, "rule.g": 0.0}, 0.6
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
+@pytest.mark.parametrize("cause", [by_time, by_crossing, by_clock, by_relay])
+def test_reset_by_what_makes_its_guard_jump(cause, method):
+    """Behind the reset at T h = a + q (t - T), and T moves as the cause says."""
+    blocks, moves, T = cause()
+    loop = nlctl.interconnect(
+        [nlctl.block(Tank(), "tank"), *blocks], inputs=[], outputs=["h"], name="loop"
+    )
+    t, by = np.array([0.0, 0.3, T + 0.1]), [*moves, "tank.a", "tank.q"]
+    made = nlctl.sensitivity_response(loop, t, with_respect_to=by, method=method)
+    assert not made.missing
+    assert made.values[0] == pytest.approx([0, 0.3, 0.15])
+    for name, move in moves.items():
+        assert made["h", name] == pytest.approx([0, 0, -move], abs=1e-8)
+    assert made["h", "tank.a"] == pytest.approx([0, 0, 1], abs=1e-8)
+    assert made["h", "tank.q"] == pytest.approx([0, 0.3, 0.1], abs=1e-8)
+
+
+@pytest.mark.parametrize("method", ["auto", "tsit5", "rodas5p"])
+def test_narrow_functions_are_followed(method):
+    """All of a narrow hill is passed at the rate R: the integral over t is sqrt(pi) / R."""
+    hill = ct.nlsys(
+        lambda t, x, u, p: [p["R"], np.exp(-(((x[0] - p["c"]) / p["d"]) ** 2)) / p["d"]],
+        lambda t, x, u, p: [x[1]], inputs=0, outputs=["y"], states=["x", "y"],
+        params={"R": R, "c": 1.3, "d": 1e-2}, name="hill",
+    )  # fmt: skip
+    by = ["hill.R", "hill.c", "hill.d"]
+    made = nlctl.sensitivity_response(hill, [0, 3.0], with_respect_to=by, method=method)
+    assert made.derivatives[0, :, -1] == pytest.approx([-np.sqrt(np.pi) / R**2, 0, 0], abs=1e-5)
+
+
+def test_memories_behind_delays_are_refused():
+    """Where they turn is not known to the last digit without the rate, a corner not at all."""
+    wire = nlctl.block(nlctl.TransportDelay(inputs=("u",), outputs=("s",), delay=0.2), "wire")
+    moving = source(lambda t, x, u, p: [np.sin(x[0] * p["w"])], {"w": 3.0})
+    gap = nlctl.block(nlctl.Backlash(), "gap", inputs=["s"], outputs=["v"])
+    loop = nlctl.interconnect([wire, moving, gap], inputs=[], outputs=["v"], name="loop")
+    with pytest.raises(CompileError, match="a memory is driven by a delayed signal"):
+        nlctl.sensitivity_response(loop, [0, 1], with_respect_to="source.w")
