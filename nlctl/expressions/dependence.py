@@ -53,3 +53,15 @@ def _of_node(node: Expr, parts: list[np.ndarray], array: str, count: int) -> np.
     for part in parts:
         nothing = nothing | part
     return nothing
+
+
+def is_straight(function: Expr) -> bool:
+    """Whether a function of t alone is a straight line, whatever the parameters are."""
+    straight: set[Expr] = set()
+    for node in needed([function]):
+        varying = [arg for arg in node.args if arg.varies]
+        is_multiple = node.op == "mul" or (node.op == "div" and not node.args[1].varies)
+        is_line = node.op in ("add", "sub", "neg") or (is_multiple and len(varying) == 1)
+        if node.op == "leaf" or (is_line and straight.issuperset(varying)):
+            straight.add(node)
+    return function in straight

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..expressions.evaluate import evaluate_expressions
 from ..responses.event_log import EventLog
 from ..wording import numbered
 from .compiled import Compiled
@@ -15,6 +16,8 @@ from .integrate.log import OF_TIME, log_room
 from .integrate.memory import grown, with_fields
 from .integrate.workspace import Task, Work
 
+_DIRECTIONS = ("falling", "rising")
+_AROUND = 1e-13  # of a time: where it is looked at before and behind a switch
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
     "absolute": "abs", "minimum": "minimum", "maximum": "maximum", "remainder": "%",
@@ -65,12 +68,39 @@ def _labelled(compiled: Compiled, conditions: Conditions) -> list[tuple[str, str
 
 def happened(compiled: Compiled, run: Any, j: int = 0) -> EventLog:
     """Return what has happened in lane `j` of a run."""
-    rows = row_labels(compiled, run.machine.lowered.conditions)
-    labels = [(*row, direction) for row in rows for direction in ("falling", "rising")]
+    conditions = run.machine.lowered.conditions
+    rows = row_labels(compiled, conditions)
+    labels = [(*row, direction) for row in rows for direction in _DIRECTIONS]
     count = int(run.lanes["noted"][j])
-    coded = run.work.log.row[:count, j]
-    return EventLog(
-        time=run.work.log.t[:count, j].copy(),
-        label=np.where(coded // 2 == OF_TIME, len(labels), coded),
-        labels=(*labels, ("", "condition of t", "")),
-    )
+    time, coded = run.work.log.t[:count, j].copy(), run.work.log.row[:count, j]
+    label = np.where(coded // 2 == OF_TIME, len(labels), coded)
+    if conditions.declared_of_time:
+        time, label = _with_declared(conditions, run.task, j, time, label, len(labels))
+    return EventLog(time=time, label=label, labels=(*labels, ("", "condition of t", "")))
+
+
+def _with_declared(
+    conditions: Conditions, task: Task, j: int, time: np.ndarray, label: np.ndarray, of_time: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return events with what blocks declare of t, where that has switched."""
+    column, times = task.p[:, j], []
+    for t, code in zip(time.tolist(), label.tolist(), strict=True):
+        crossed = declared_switches(conditions, column, t) if code == of_time else []
+        times += [(t, 2 * row + rises) for row, rises in crossed] or [(t, code)]
+    found = np.array(times, dtype=float).reshape(-1, 2)
+    return found[:, 0], found[:, 1].astype(np.int64)
+
+
+def declared_switches(conditions: Conditions, p: np.ndarray, t: float) -> list[tuple[int, bool]]:
+    """Return which declared functions of t switch at a time: their rows, and whether they rise."""
+    functions = conditions.declared_of_time
+    around = t + _AROUND * max(abs(t), 1e-300) * np.array([-1.0, 1.0])
+    given = {"t": around[None, :], "p": p[:, None]}
+    sides = [
+        np.broadcast_to(v, (1, 2))[0] for v in evaluate_expressions([*functions.values()], given)
+    ]
+    return [
+        (row, bool(after > before))
+        for row, (before, after) in zip(functions, sides, strict=True)
+        if np.sign(before) != np.sign(after)
+    ]

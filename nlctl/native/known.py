@@ -16,7 +16,7 @@ from ..upstream.systems import System
 from . import compiled as engine
 from .compiled import Compiled, with_watched
 from .followed import followed
-from .happened import row_labels
+from .happened import declared_switches, row_labels
 from .machine.evaluations import prepared_parameters
 from .machine.routine import Routine
 from .timed.ahead import ahead
@@ -40,15 +40,31 @@ def known_conditions(
     found = {k: v[0] for k, v in ahead(lowered.timed, p[:, None], times, np.inf).items()}
     stops = np.stack([found["until"], found["jumps"]])[:, np.isfinite(found["jumps"])]
     located = lowered.conditions.rows - len(watched)  # these the run watches itself
+    switched = _switched(compiled, p)
     if not located:
-        return Known(stops=stops, longest=_longest(found, times), followed=followed(compiled, p))
+        return Known(
+            stops=stops, switched=switched, longest=_longest(found, times),
+            followed=followed(compiled, p),
+        )  # fmt: skip
     first = compiled.program.switching
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
     return Known(
-        stops=stops, longest=_longest(found, times), labels=tuple(labels),
+        stops=stops, switched=switched, longest=_longest(found, times), labels=tuple(labels),
         partners=tuple(lowered.conditions.partners[:located]), followed=followed(compiled, p),
         crossings=_crossings(compiled, p, slice(first, first + located)),
     )  # fmt: skip
+
+
+def _switched(compiled: Compiled, p: np.ndarray) -> Callable[[float], list[tuple[str, str, str]]]:
+    """Return a function that says which declared functions of t switch at a time."""
+    conditions = compiled.lowered.conditions
+    labels = row_labels(compiled, conditions)
+
+    def switched(t: float) -> list[tuple[str, str, str]]:
+        rows = declared_switches(conditions, p, t)
+        return [(*labels[row], "rising" if rises else "falling") for row, rises in rows]
+
+    return switched
 
 
 def _longest(found: dict[str, Any], times: np.ndarray) -> Callable[[float], float]:

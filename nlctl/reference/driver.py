@@ -127,7 +127,7 @@ class Driver:
                     self._record(t, x, ends=True)
                     return
                 if t in self.stops.changes:
-                    self.happened.append((t, "", "condition of t", ""))
+                    self.happened += self.stops.switched(t)
                 self._keep((begun, t), pieces, event)
                 what = self.stops.due.get(t, frozenset())
 

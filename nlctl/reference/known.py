@@ -15,12 +15,18 @@ def _unbounded(t: float) -> float:
     return np.inf
 
 
+def _none(t: float) -> list[tuple[str, str, str]]:
+    return []
+
+
 @dataclass(frozen=True, kw_only=True)
 class Known:
     """Conditions of a diagram's equations, as far as these can be read."""
 
     # times (s) until which conditions of t alone are as they were, and when they have changed
     stops: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
+    # ``switched(t)``: block, name and direction of the declared functions of t that switch there
+    switched: Callable[[float], list[tuple[str, str, str]]] = _none
     # ``longest(t)``: how long a step from there may be (s), so that nothing that is a function of
     # t alone is stepped over
     longest: Callable[[float], float] = _unbounded

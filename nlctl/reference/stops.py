@@ -34,6 +34,7 @@ class Stops:
         self.borders, self.spaces = _spacing(grid)
         self.longest, self._changes = conditions.longest, conditions.stops
         self.changes = frozenset(conditions.stops[1].tolist())
+        self._switched = conditions.switched
         known = (due.times, _break_points(times, inputs), conditions.stops[1])
         every = np.union1d(np.concatenate(known), np.append(self.borders, end))
         self.times = every[(every > begin) & (every <= end)]
@@ -41,6 +42,10 @@ class Stops:
     def after(self, t: float) -> float:
         """Return the next stop after a time."""
         return float(self.times[np.searchsorted(self.times, t, side="right")])
+
+    def switched(self, t: float) -> list[tuple[float, str, str, str]]:
+        """Return the events at a stop where functions of t alone switch."""
+        return [(t, *each) for each in self._switched(t) or [("", "condition of t", "")]]
 
     def before(self, t: float) -> float:
         """Return the last time before a stop at which functions of t alone are as they were."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
-from ...expressions.dependence import reads
+from ...expressions.dependence import is_straight, reads
 from ...expressions.derivatives import tangents
 from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
@@ -58,6 +58,9 @@ class Conditions:
     # first those that only bend, then those at which something may jump
     located: tuple[Located, ...] = ()
     of_time: tuple[Expr, ...] = ()  # conditions of t alone, which are solved before a run
+    # switching functions of t alone that blocks declare, by their rows: faults' beginnings and ends
+    declared_of_time: Mapping[int, Expr] = field(default_factory=dict)
+    straight: tuple[Expr, ...] = ()  # those that are straight lines
     # of products of sines of t the angular frequencies of the factors
     waves: tuple[tuple[Expr, ...], ...] = ()
     pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
@@ -133,20 +136,33 @@ def found_conditions(
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
         beyond += left
-    of_time |= dict.fromkeys(_sides_of_time(reader.graph, declared, timed))
+    declared_of_time = _declared_of_time(declared, timed)
+    straight = tuple(filter(is_straight, declared_of_time.values()))
+    bent = (function for function in declared_of_time.values() if function not in straight)
+    of_time |= dict.fromkeys(_sides(reader.graph, bent))
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
-        located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
-        shown=count, sharp=_sharp(reader, rates, inside - timed),
+        located=ordered, of_time=tuple(of_time), declared_of_time=declared_of_time,
+        straight=straight, waves=waves, pulses=pulses, beyond=beyond, shown=count,
+        sharp=_sharp(reader, rates, inside - timed),
     )  # fmt: skip
 
 
-def _sides_of_time(graph: Graph, declared: Sequence[Tracer], timed: set[Expr]) -> list[Expr]:
-    """Return on which side of 0 the declared switching functions are that vary with t alone."""
-    # At 0 itself they may be on either.
-    functions = [function for function in _pieces(declared) if function in timed]
-    return [graph.op(order, function, graph.const(0.0)) for function in functions for order in ("lt", "le")]
+def _declared_of_time(declared: Sequence[Tracer], timed: set[Expr]) -> dict[int, Expr]:
+    """Return the declared switching functions that vary with t alone, by their rows."""
+    functions, row = dict[int, Expr](), 0
+    for expr, size in (piece for array in declared for piece in array.pieces()):
+        if expr in timed and size == 1:
+            functions[row] = expr
+        row += size
+    return functions
+
+
+def _sides(graph: Graph, functions: Iterable[Expr]) -> list[Expr]:
+    """Return on which side of 0 functions are; where they are 0 a block may be on either."""
+    zero = graph.const(0.0)
+    return [graph.op(order, function, zero) for function in functions for order in ("lt", "le")]
 
 
 def _entered(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,8 @@ from ...expressions.dependence import rows_read
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
 from ..equations.located import Conditions
-from .breaks import break_points
+from .breaks import break_points, in_order
+from .straight import line_switches
 
 _KEPT = 256  # parameter vectors
 CELLS = 8192  # of a run, at whose ends functions are looked at
@@ -55,6 +56,10 @@ def ahead(
     count = p.shape[1]
     span = float(times[0]), float(times[-1])
     own = [_of(timed, p[:, j], span) for j in range(count)]
+    straight = timed.conditions.straight
+    if straight:
+        until, behind = line_switches(straight, p, span)
+        own = [_with_more(one, until[:, j], behind[:, j]) for j, one in enumerate(own)]
     jumps = np.full((2, count, max(one.breaks.size for one in own)), np.inf)
     limits = np.full((count, max(one.reach.size for one in own)), np.inf)
     for j, one in enumerate(own):
@@ -77,6 +82,14 @@ def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
         longest = np.pi / fastest if fastest else np.inf
         cache[key] = Ahead(until=until, breaks=breaks, longest=longest, reach=pulses)
     return cache[key]
+
+
+def _with_more(one: Ahead, until: np.ndarray, behind: np.ndarray) -> Ahead:
+    """Return what is known of a member with more switches, those that are finite."""
+    switches = np.isfinite(behind)
+    sides = (one.until, until[switches]), (one.breaks, behind[switches])
+    before, after = in_order(*map(np.concatenate, sides))
+    return replace(one, until=before, breaks=after)
 
 
 def _fastest(waves: tuple[tuple[Expr, ...], ...], p: np.ndarray) -> float:

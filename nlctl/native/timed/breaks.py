@@ -72,11 +72,16 @@ def break_points(
                 sides = _beyond_rounding(indicator, nudged, sides, span)
             until.append(sides[0])
             jumps.append(np.minimum(sides[1], span[1]))
-    behind = np.concatenate(jumps)
+    return in_order(np.concatenate(until), np.concatenate(jumps))
+
+
+def in_order(before: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return switches in the order of time; those that overlap are one."""
     order = np.argsort(behind, kind="stable")
-    behind, first = np.unique(behind[order], return_index=True)
-    before = np.minimum.accumulate(np.concatenate(until)[order][::-1])[::-1]
-    return before[first], behind
+    behind = behind[order]
+    before = np.minimum.accumulate(before[order][::-1])[::-1]
+    begins = np.append(True, before[1:] >= behind[:-1])[: before.size]
+    return before[begins], behind[np.append(begins[1:], True)[: behind.size]]
 
 
 def _rows(values: list[np.ndarray], t: np.ndarray) -> list[np.ndarray]:
