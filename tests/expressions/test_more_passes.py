@@ -92,6 +92,8 @@ def test_only_members_that_take_more_passes_call_the_function():
     assert many.signals["x"] == pytest.approx(wanted, abs=1e-9)
 
 
+# python-control's, which `pytest.warns` repeats as this module's
+@pytest.mark.filterwarnings("ignore:Setting the shape on a NumPy array:DeprecationWarning")
 def test_derivatives_of_runs_are_differences_where_passes_do_not_suffice():
     """d(exp(-t/10) x0) / dx0."""
     with pytest.warns(errors.InexactWarning):

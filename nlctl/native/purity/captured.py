@@ -125,7 +125,7 @@ def recorded(value: Any) -> Any:
         return _Kept(type(value), tuple(map(recorded, value)))
     if isinstance(value, set | frozenset):
         return _Kept(type(value), frozenset(value))
-    if isinstance(value, np.poly1d) or type(value).__module__.startswith(_TABLES):
+    if isinstance(value, np.poly1d) or _is_of_tables(value):
         return _Content(value, {k: recorded(v) for k, v in _content(value).items()})
     return value.copy() if _is_table(value) else value
 
@@ -159,11 +159,16 @@ class _Content:
 
 
 def _content(value: Any) -> dict[str, Any]:
-    """Return the numbers and containers that an object of a library holds."""
+    """Return the numbers and containers that an object of a library holds, and its parts."""
     slots = [name for cls in type(value).__mro__ for name in getattr(cls, "__slots__", ())]
     held = {name: getattr(value, name) for name in slots if hasattr(value, name)}
     held |= getattr(value, "__dict__", {})
-    return {k: v for k, v in held.items() if isinstance(v, (np.ndarray, tuple, list, *PLAIN))}
+    kept = (np.ndarray, tuple, list, *PLAIN)  # or a part: SciPy 1.18 keeps numbers in one
+    return {k: v for k, v in held.items() if isinstance(v, kept) or _is_of_tables(v)}
+
+
+def _is_of_tables(value: Any) -> bool:
+    return type(value).__module__.startswith(_TABLES)
 
 
 def same(now: Any, then: Any) -> bool:
