@@ -231,7 +231,10 @@ class LivePart {
     const field = put("input", "", box);
     Object.assign(field, { type: "number", step: "any", id });
     field.setAttribute("aria-label", `${handle.name}, exact value`);
-    field.addEventListener("focus", () => { field.value = this.values[k]; });
+    field.addEventListener("focus", () => {
+      field.value = this.values[k];
+      field.select(); // as it was before the value was another one
+    });
     field.addEventListener("blur", () => { field.value = brief(this.values[k]); });
     const set = (value, still) => {
       if (!Number.isFinite(value)) return;
