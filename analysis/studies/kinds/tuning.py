@@ -38,7 +38,7 @@ from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
-from ..page.text import margin_text
+from ..page.text import DID_NOT_END, margin_text
 from ..result import Result
 from .context import CLOPPER, statement_numbers
 
@@ -195,8 +195,8 @@ def _sentence(asked: Tuning, tuned: Tuned, before: Violation, after: Violation) 
         for name, new, old in zip(tuned.names, tuned.values, tuned.start, strict=True)
     )
     numbers = "; ".join(
-        f"the {_what(tuned, key)} is {margin_text(tuned.before[key])} before and "
-        f"{margin_text(tuned.after[key])} after"
+        f"the {_what(tuned, key)} is {_size(tuned.before[key])} before and "
+        f"{_size(tuned.after[key])} after"
         for key in tuned.after
     )
     runs = (
@@ -209,6 +209,11 @@ def _sentence(asked: Tuning, tuned: Tuned, before: Violation, after: Violation) 
         f"rows {before.violations} of {before.runs} violate the spec with the gains as they were; "
         f"with those that were found {after}"
     )
+
+
+def _size(margin: float) -> str:
+    text = margin_text(margin)
+    return "that of a run that did not end" if text == DID_NOT_END else text
 
 
 def _what(tuned: Tuned, key: str) -> str:
