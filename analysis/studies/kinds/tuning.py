@@ -45,7 +45,7 @@ from .context import CLOPPER, statement_numbers
 _BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
 _TRIED = "What every choice of gains was worth on the samples that gains were found on."
 _BOUGHT = (
-    "What each gain has bought, on these samples: with this one alone as found, and with all but "
+    "What each gain contributes, on these samples: with this one alone as found, and with all but "
     "this one. What lies far outside is cut off."
 )
 _FRESH = "Share of the fresh rows with at most that margin, with the same rows before and after."
@@ -266,14 +266,14 @@ def _measured(finding: Finding, asked: Tuning) -> dict[str, str]:
 
 
 def _items(finding: Finding, result: Result, asked: Tuning, key: str) -> Iterator[Item]:
-    """Yield before and after, which gain has bought what, and how it was found."""
+    """Yield before and after, which gain contributes what, and how it was found."""
     n, tables = finding.numbers, finding.tables
     is_cost = n["goal"] != "margin"
     what = f"mean {n['goal']}" if is_cost else "least margin"
     gains = tables["gains"]
     columns = {"before": "before", "after": "after", "low": "from", "high": "to"}
     columns |= {"alone": f"{what} with it alone", "put_back": f"{what} with all but it"}
-    yield result_table(gains, "The gains, and what each has bought.", columns)
+    yield result_table(gains, "The gains, and what each contributes.", columns)
     lines = "\n".join(f'"{name}" = {value!r}' for name, value in n["gains"].items())
     yield Paragraph(text="The gains that were found:", code=lines)
     signals = tables["signals"]
