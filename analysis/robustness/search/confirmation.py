@@ -54,7 +54,8 @@ class Confirmation:
     def __str__(self) -> str:
         if self.reason:
             return f"Not confirmed: {self.reason}."
-        low, high = self.replays["margin"].min(), self.replays["margin"].max()
+        reached = self.replays["margin"].to_numpy(dtype=float)
+        low, high = reached.min(), reached.max()
         if high <= -FAILED:
             return f"Confirmed by {len(self.replays)} integrations, none of which reaches its end."
         return (
