@@ -179,6 +179,16 @@ def actuator_errors(
     return figure
 
 
+def figure_files(record: pd.DataFrame) -> dict[str, bytes]:
+    """Return the figures of the page as SVG by the names of their files."""
+    return {
+        f"actuators-{example[-1]}.svg": svg_files(
+            [actuator_errors(record[record["example"] == example], meets_the_spec, BAND)]
+        )[0]
+        for example in paper.EXAMPLES
+    }
+
+
 def _main() -> None:
     """Make the record again, print its tables, and draw its figures where a folder is named."""
     rows = [
@@ -193,11 +203,9 @@ def _main() -> None:
     print(assumption_text())
     for example in paper.EXAMPLES:
         print("\n" + controllers_text(kept, example))
-        of_example: Any = kept[kept["example"] == example]
-        for folder in sys.argv[1:]:
-            figure = actuator_errors(of_example, meets_the_spec, BAND)
-            place = Path(folder) / f"actuators-{example[-1]}.svg"
-            place.write_bytes(svg_files([figure])[0])
+    for folder in sys.argv[1:]:
+        for name, file in figure_files(kept).items():
+            (Path(folder) / name).write_bytes(file)
 
 
 if __name__ == "__main__":

@@ -373,8 +373,13 @@ def checked_times(timepts: object) -> np.ndarray:
     times = times.copy()
     if times.ndim != 1 or times.size < 2:
         raise ParameterError(f"timepts needs at least two times, got shape {times.shape}")
-    if not np.isfinite(times[[0, -1]]).all() or not (times[1:] > times[:-1]).all():
-        raise ParameterError("timepts needs finite times in increasing order")
+    is_finite = np.isfinite(times)
+    rises = (times[1:] > times[:-1]) & is_finite[1:] & is_finite[:-1]
+    if not rises.all():
+        before, after = times[(at := int(rises.argmin())) : at + 2]
+        raise ParameterError(
+            f"timepts needs finite times in increasing order, got {before:g} s, then {after:g} s"
+        )
     return times
 
 

@@ -1,4 +1,4 @@
-"""Figures of tuning: how gains were found, what each has bought, margins before and after."""
+"""Figures of tuning: how gains were found, what each contributes, margins before and after."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
 
 @draws
 def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figure:
-    """Draw what each gain has bought: with it alone as found, and with all others as found.
+    """Draw what each gain contributes: with it alone as found, and with all others as found.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def live_item(
     what = ", ".join(handle.name for handle in moved)
     return Live(
         key="live",
-        caption="This page runs the loop itself, by the integrators and equations that made it. "
+        caption="This page runs the loop itself: the same equations, by integrators of nlctl. "
         f"Grey: {origin}.",
         description=f"Sliders for {what}.",
         program=content,

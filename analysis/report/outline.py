@@ -170,7 +170,7 @@ def is_short(text: str) -> bool:
 
 def _shown(value: object) -> str:
     """Return a cell's text: numbers with the digits that a reader can use."""
-    text = f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+    text = f"{value + 0.0:.6g}" if isinstance(value, float | np.floating) else str(value)
     return "" if value is None else _NOT_FINITE.get(text, text)
 
 

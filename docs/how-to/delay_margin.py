@@ -38,8 +38,8 @@ assert np.allclose(point.outputs, 4)
 # Its linearization there is :math:`\frac{s + 1/4}{s} \, \frac{1}{s + 1/4} \, e^{-0.8 s} = e^{-0.8 s} / s`, and the response is that:
 open_loop = nlctl.frequency_response(chain, np.geomspace(0.01, 10, 500), at=point)
 s = 1j * open_loop.omega
-known = np.exp(-0.8 * s) / s
-gap = np.abs(open_loop.frdata[0, 0] / known - 1).max()
+exact = np.exp(-0.8 * s) / s
+gap = np.abs(open_loop.frdata[0, 0] / exact - 1).max()
 print(f"furthest from the closed form, relative: {gap:.0e}")
 assert gap < 1e-12
 

@@ -44,7 +44,7 @@ tuning = Table(
     columns=("of", "gain"),
     rows=[("angle", gains[0, 0]), ("rate", gains[0, 1])],
 )
-made = loop_report(
+content = loop_report(
     loop,
     title="An inverted pendulum",
     response=response,
@@ -70,14 +70,14 @@ made = loop_report(
     revision="A",
 )
 with tempfile.TemporaryDirectory() as folder:
-    page = write_report(made, folder)
+    page = write_report(content, folder)
     print(
         f"{page.name}, {page.stat().st_size / 1000:.0f} kB, and {sorted(p.name for p in Path(folder).iterdir())}"
     )
 
 # %%
 # ``write_pdf(page, "report.pdf")`` prints it through an installed Chromium;
-# ``nlctl.analysis.report.framed(made)`` shows it in a notebook.
+# ``nlctl.analysis.report.framed(content)`` shows it in a notebook.
 #
 # The closed loop is linear where the angle is small: there its slowest mode is :math:`e^{-2t}`.
 late = np.abs(response.outputs[0, t >= 4])

@@ -29,7 +29,7 @@ assert rows["u, v"] == ["u", "v"]
 # Or say what is shown: a name has a row of its own, a list of names shares one.
 drawn = run.plot(signals=[["yd", "y"], "u"])
 assert drawn.axes.shape == (2, 1)
-drawn.axes[0, 0].set_title("An own title")
+drawn.axes[0, 0].set_title("A title of your own")
 
 # %%
 # With arguments of ``ct.time_response_plot`` it is python-control's plot. States go by their names, also in a table.

@@ -38,13 +38,13 @@ loops = rb.prepare(
 # %%
 # Independent draws give an exact bound, with its assumptions in the sentence:
 rows = rb.sweep(loops, rb.independent(loops.experiment.space, 500, entropy=1))
-found = rb.violation_probability(rows.design, rows.table["spec"])
-print(found)
+estimate = rb.violation_probability(rows.design, rows.table["spec"])
+print(estimate)
 
 # %%
 # With no violation in n draws, the bound at 99 % is :math:`1 - 0.01^{1/n}`.
-assert found.violations == 0
-assert abs(found.upper - (1 - 0.01 ** (1 / 500))) < 1e-9
+assert estimate.violations == 0
+assert abs(estimate.upper - (1 - 0.01 ** (1 / 500))) < 1e-9
 
 # %%
 # A search says something else: the lowest margin that it found.

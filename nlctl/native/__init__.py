@@ -3,7 +3,7 @@
 `compile` reads a diagram (`diagram/`).  The blocks' functions are run once on symbols
 (`equations/`), and what they compute is planned for one member or several; one generator writes
 LLVM IR from the plan (`codegen/`), and its object code is kept on disk (`machine/`).  What cannot
-be traced is called as it stands, as numba compiles it or back in Python (`opaque/`), if it depends
+be traced is called unchanged, as numba compiles it or back in Python (`opaque/`), if it depends
 on its arguments alone (`purity/`).  Algebraic loops are refused, or solved by Newton's method with
 the derivatives of their own expressions.
 

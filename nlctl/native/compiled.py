@@ -100,7 +100,7 @@ class Compiled(Reading, StandIn):
     def source(self) -> str:
         """What runs for one member: LLVM IR, in which comments say what each value is.
 
-        Comments at its end name the functions that it calls as they stand, and why: in machine
+        Comments at its end name the functions that it calls unchanged, and why: in machine
         code of numba, or back in Python.  Names of loops that are solved have their signals.
         """
         return "\n".join([self.lowered.text, *(f"; {line}" for line in called(self)), ""])
@@ -229,7 +229,7 @@ class Compiled(Reading, StandIn):
         Warns
         -----
         InexactWarning
-            If a function is called as it stands: its derivatives are differences.
+            If a function is called unchanged: its derivatives are differences.
 
         Notes
         -----
@@ -390,7 +390,7 @@ def compile(  # noqa: A001 (what it does)
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
 
     A function that cannot be written out as expressions (it integrates an equation, say) is called
-    as it stands: as machine code that numba makes of it, otherwise back in Python, as slow as
+    unchanged: as machine code that numba makes of it, otherwise back in Python, as slow as
     python-control.  ``print(compiled)`` says which, and what to do about it.  So is one with a loop
     that takes more passes in a run than are written out; its statistics say so.
 
@@ -461,7 +461,7 @@ def linearize(
     Warns
     -----
     InexactWarning
-        If a function is called as it stands: its derivatives are differences, all others exact.
+        If a function is called unchanged: its derivatives are differences, all others exact.
 
     Examples
     --------

@@ -46,7 +46,7 @@ def described(reading: Reading) -> str:
     for loop in schedule.loops:
         torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
-    lines += [f"  as it stands {line}" for line in called(reading)]
+    lines += [f"  unchanged    {line}" for line in called(reading)]
     lines += [
         f"  passes       at most {WRITTEN_PASSES} of each loop are written out; "
         f"a run that takes more calls the {name}"
@@ -64,14 +64,13 @@ def described(reading: Reading) -> str:
 
 
 def called(reading: Reading) -> Iterator[str]:
-    """Yield which functions are called as they stand, how, and why: a line each."""
+    """Yield which functions are called unchanged, how, and why: a line each."""
     # Which of the two ways it is, is known as soon as machine code has been made.
     made = reading.cache.of(Machine)
     back = {name for each in made for name in each.called_back}
     for name, call in reading.equations.calls.items():
-        how = SLOW if name in back else "in machine code of numba"
-        how = how if made else "as it stands"
-        yield f"{call.kind} of block '{call.block}', {how}: {call.why}"
+        how = f", {SLOW if name in back else 'in machine code of numba'}" if made else ""
+        yield f"{call.kind} of block '{call.block}'{how}: {call.why}"
 
 
 def described_functions(schedule: Schedule, cut: Iterable[tuple[int, str]]) -> tuple[str, ...]:
@@ -89,7 +88,7 @@ def _conditions(reading: Reading) -> Iterator[str]:
     if parts:
         yield ", ".join(parts)
     if reading.equations.calls:
-        yield "none known of functions that are called as they stand: steps may pass over theirs"
+        yield "none known of functions that are called unchanged: steps may pass over theirs"
 
 
 def _timebase(system: System) -> str:

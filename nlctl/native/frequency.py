@@ -75,7 +75,7 @@ def frequency_response(
     Warns
     -----
     InexactWarning
-        If a function is called as it stands: its derivatives are differences, all others exact.
+        If a function is called unchanged: its derivatives are differences, all others exact.
 
     Examples
     --------

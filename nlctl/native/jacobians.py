@@ -50,7 +50,7 @@ def inexact(found: Equations, results: Sequence[str] = ("dx",)) -> str | None:
     parts = [expr for name in results for expr, _ in found.pieces(name)]
     names = dict.fromkeys(node.data[0] for node in needed(parts) if node.op == "call")
     used = [found.calls[name] for name in names]
-    told = [f"the {c.kind} function of block '{c.block}' is called as it stands ({c.reason})"
+    told = [f"the {c.kind} function of block '{c.block}' is called unchanged ({c.reason})"
             for c in used]  # fmt: skip
     return ", and ".join(told) or None
 

@@ -47,7 +47,7 @@ class Lowered:
     # that the others write to, so members that run at the same time need a `c` each
     functions: Mapping[str, Function]
     exact: frozenset[Expr]  # operations that are rounded one by one
-    calls: Mapping[str, Call]  # functions that are called as they stand, by name
+    calls: Mapping[str, Call]  # functions that are called unchanged, by name
     solvers: Mapping[str, Solver]  # searches for the signals of algebraic loops, by name
     rows: Mapping[str, int]  # rows of every array
     lanes: int  # number of members

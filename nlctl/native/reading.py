@@ -76,7 +76,7 @@ class Reading:
         return lower(self.schedule, self.program, 1, self.equations)
 
     def calling(self, cut: frozenset[tuple[int, str]]) -> Self:
-        """Return the diagram with functions, of blocks at these places, called as they stand."""
+        """Return the diagram with functions, of blocks at these places, called unchanged."""
         if not cut:
             return self
         read = self.schedule

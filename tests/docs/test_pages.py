@@ -3,8 +3,6 @@
 import ast
 import linecache
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -46,14 +44,6 @@ def test_code_of_the_explanations_runs(page):
     """Each block asserts what the text says; but for the run of 10,000 s, which is weekly."""
     assert all("assert" in code for code in blocks(page))
     ran(page, without=["late"])
-
-
-@pytest.mark.slow
-def test_the_figure_of_the_jumps_is_made_again(tmp_path):
-    """Its script checks each curve against closed forms, and writes the figure that is shown."""
-    script = EXPLANATION / "between_steps.py"
-    subprocess.run([sys.executable, "-W", "error", str(script), str(tmp_path)], check=True)
-    assert (tmp_path / "between-steps.svg").stat().st_size > 1e4
 
 
 def test_the_burst_that_is_told_is_that_of_the_kept_run():

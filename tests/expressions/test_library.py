@@ -142,6 +142,7 @@ def equal(found, wanted):
     )
 
 
+@pytest.mark.filterwarnings("ignore:numpy.fix is deprecated:DeprecationWarning")  # NumPy 2.5
 @pytest.mark.parametrize("line", range(len(LINES)))
 @pytest.mark.parametrize("function", OF_LINES, ids=lambda f: f.__name__)
 def test_a_function_of_one_array(function, line):

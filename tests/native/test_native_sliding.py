@@ -311,7 +311,7 @@ def test_two_that_act_on_each_other_are_refused():
         (lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0] + u[0], "jumps with it"),
         (lambda t, x, u, p: 0.5 - u[0] ** 3, first, r"does not enter the rate u' .* as a \+ b v"),
         (lambda t, x, u, p: 0.5 - np.floor(u[0]), first, "does not enter the rate"),
-        (lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: ber(x[0]), "is called as it stands"),
+        (lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: ber(x[0]), "is called unchanged"),
         (lambda t, x, u, p: ber(x[0]) - u[0], first, "has no rate"),
     ],
 )  # fmt: skip

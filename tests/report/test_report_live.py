@@ -175,6 +175,24 @@ def test_sliders_move_by_keys_and_the_command_repeats_the_run(opened):
     assert "--set" not in shown.locator("figure.live code").text_content()
 
 
+def test_a_field_shows_digits_that_fit_and_keeps_the_value(opened):
+    """All digits are there for whoever writes in it, and in the command."""
+    shown = opened(360)
+    field = shown.get_by_label("plant.x1(0), exact value")
+    for value, brief in (("0.8000000000000007", "0.8"), ("1.2345678901234567", "1.23457")):
+        field.fill(value)
+        again(shown, lambda: field.press("Enter"))
+        field.blur()
+        assert field.input_value() == brief
+        fits = field.evaluate("field => field.scrollWidth <= field.clientWidth")
+        assert fits
+        field.focus()
+        assert float(field.input_value()) == float(value)
+        field.blur()
+        command = shown.locator("figure.live code").text_content()
+        assert float(command.split("plant.x1(0)=")[1].rstrip("'")) == float(value)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1200])
 def test_nothing_is_in_the_way_of_any_reader(opened, width, scheme):

@@ -577,6 +577,15 @@ def test_margins_of_runs_that_did_not_end_say_so():
     assert margin_text(-0.25) == "-0.25"
 
 
+def test_no_sentence_has_the_grade_of_a_run_that_did_not_end(page):
+    """The worst row of this study bursts: its grade lies between one and two times -FAILED."""
+    text = Reader(page).text
+    assert "the lowest margin is that of a run that did not reach its end" in text
+    assert "integrations, none of which reaches its end." in text
+    assert "the worst run that is known (the run did not end)" in text
+    assert "·10⁶" not in text
+
+
 def renamed(result, names):
     """Return the result with other names of the quantities."""
 

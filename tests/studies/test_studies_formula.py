@@ -95,6 +95,7 @@ def test_and_binds_tighter_than_or_and_prefixes_tighter_than_both():
         ("(e <= 1", "needs ')', found the end"),
         ("and <= 1", "needs a band such as |e| <= 0.15, found 'and' at character 1"),
         ("|always| <= 1", "needs the name of a signal, found 'always'"),
+        ("allways |e| <= 1", "needs '<=' or '>=' (is 'allways' meant to be 'always'?), found '|'"),
         ("__import__('os') <= 1", "needs '<=' or '>=', found '('"),
         ("e <= nan", "needs a number, found 'nan'"),
         ("(" * 10_000 + "e <= 1", "at most 50 levels"),

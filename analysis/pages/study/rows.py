@@ -15,7 +15,7 @@ from ...report.document import History, Item, Paragraph, Table, captioned
 from ...robustness.search.evaluation import margins_of
 from ...robustness.stl.spec import violates
 from ...studies.page.tables import known
-from ...studies.page.text import clipped, margin_text, status_text, violate
+from ...studies.page.text import clipped, margin_in_words, margin_text, status_text, violate
 from ...studies.result import Result
 from . import text as text
 from .claims import has_ids, refusal
@@ -163,10 +163,10 @@ def fan_items(histories: Histories, key: str) -> Iterator[Item]:
         if histories.ended
         else ""
     )
-    worst = margin_text(histories.margin)
+    worst = margin_in_words(histories.margin)
     caption = (
         f"The first {counted(count, 'row')} simulated again: {_bands(histories)}, the nominal run, "
-        f"and the worst run that is known (margin {worst}).{_limits(histories)}{ended} What "
+        f"and the worst run that is known ({worst}).{_limits(histories)}{ended} What "
         "leaves the picture is cut off."
     )
     drawn = figures.fans(
@@ -178,7 +178,7 @@ def fan_items(histories: Histories, key: str) -> Iterator[Item]:
     both = {f"{name}, {run}": runs[run][name] for name in histories.nominal for run in runs}
     yield History(
         key=f"{key}-history",
-        caption=f"The nominal run and the worst one that is known (margin {worst}).",
+        caption=f"The nominal run and the worst one that is known ({worst}).",
         description=f"Chart of {', '.join(histories.nominal)} in the nominal and in the worst run; "
         "the figure above shows the same runs, the slider below shows their values.",
         time=histories.time,

@@ -19,6 +19,8 @@ const digits = (value, count = 6) => {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "NaN" : value > 0 ? "∞" : "−∞";
   return String(Number(value.toPrecision(count))).replace("-", "−");
 };
+// What a field shows that nobody writes in: digits that fit. The value itself is kept.
+const brief = (value) => String(Number(value.toPrecision(6)));
 const endsOf = (values) => {
   let [low, high] = [Infinity, -Infinity];
   for (const value of values) {
@@ -229,6 +231,11 @@ class LivePart {
     const field = put("input", "", box);
     Object.assign(field, { type: "number", step: "any", id });
     field.setAttribute("aria-label", `${handle.name}, exact value`);
+    field.addEventListener("focus", () => {
+      field.value = this.values[k];
+      field.select(); // as it was before the value was another one
+    });
+    field.addEventListener("blur", () => { field.value = brief(this.values[k]); });
     const set = (value, still) => {
       if (!Number.isFinite(value)) return;
       this.values[k] = value;
@@ -257,7 +264,8 @@ class LivePart {
       if (toggle) toggle.checked = this.on[k];
       slider.value = this.values[k];
       slider.setAttribute("aria-valuetext", `${digits(this.values[k])} ${handle.unit ?? ""}`.trim());
-      if (document.activeElement !== field) field.value = this.values[k];
+      field.title = this.values[k];
+      if (document.activeElement !== field) field.value = brief(this.values[k]);
       label.classList.toggle("moved", this.isMoved(k));
     });
     this.reset.disabled = !this.values.some((_, k) => this.isMoved(k));

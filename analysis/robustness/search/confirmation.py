@@ -19,7 +19,7 @@ from nlctl.response import input_output_response
 from nlctl.responses.breaks import breaks_of, sampled_between, unsampled
 
 from ..runs.experiment import Experiment, Prepared, evaluate, loop_of_row
-from ..stl.spec import margins, unfinished_margin
+from ..stl.spec import FAILED, margins, unfinished_margin
 from ..uncertainty.space import checked_row
 from .evaluation import as_table
 
@@ -54,7 +54,10 @@ class Confirmation:
     def __str__(self) -> str:
         if self.reason:
             return f"Not confirmed: {self.reason}."
-        low, high = self.replays["margin"].min(), self.replays["margin"].max()
+        reached = self.replays["margin"].to_numpy(dtype=float)
+        low, high = reached.min(), reached.max()
+        if high <= -FAILED:
+            return f"Confirmed by {len(self.replays)} integrations, none of which reaches its end."
         return (
             f"Confirmed by {len(self.replays)} integrations: margins from {low:.6g} to {high:.6g}, "
             f"which differ by {self.spread:.2g}."

@@ -12,6 +12,7 @@ from nlctl.arguments import integer, number, of_type
 from nlctl.attributes import described_record
 from nlctl.wording import counted
 
+from ..stl.spec import FAILED
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
 from .candidates import Search, corner_count, search_worst
@@ -84,8 +85,10 @@ class WorstCase:
         some = "" if self.all_corners else "random "
         names = {"corners": f"{some}corners", "uniform": "uniform draws"}
         rows = ", ".join(f"{count} {names.get(name, name)}" for name, count in self.runs.items())
+        ended = self.margin <= -FAILED
+        size = "that of a run that did not reach its end" if ended else f"{self.margin:.4g}"
         lowest = (
-            f"the lowest margin is {self.margin:.4g} (row {self.number}, {self.found_by}): "
+            f"the lowest margin is {size} (row {self.number}, {self.found_by}): "
             f"{row_text(self.witness)}"
         )
         verdict = "A violation" if self.is_violated else "No violation, which proves nothing"

@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from nlctl.errors import ParameterError
+from nlctl.wording import nearest
 
 from .formula import And, Formula, always, begins_window, eventually, in_band, looks_ahead
 
@@ -208,4 +209,6 @@ def _band(reader: _Reader) -> Formula:
         return in_band(signal, upper=reader.number())
     if reader.took(">="):
         return in_band(signal, lower=reader.number())
-    raise reader.error("'<=' or '>='")
+    near = nearest(signal, ("always", "eventually", "not"), 1, 0.7)
+    meant = f" (is '{signal}' meant to be '{near[0]}'?)" if near else ""
+    raise reader.error(f"'<=' or '>='{meant}")

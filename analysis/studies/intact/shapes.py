@@ -35,7 +35,7 @@ def _name(value: str) -> str:
     return _inside(value)
 
 
-_Text = Annotated[str, BeforeValidator(_as_text), Field(strict=True)]
+_Text = Annotated[str, Field(strict=True), BeforeValidator(_as_text)]  # pydantic 2.7: in this order
 _Some = Annotated[bool, Field(strict=True)]
 _Count = Annotated[int, Field(strict=True, ge=0)]
 _Cell = float | _Text | None

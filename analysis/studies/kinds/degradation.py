@@ -64,7 +64,7 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     )
     bounds = dict(zip(curve.factors, curve.statements, strict=True))
     counts = "; ".join(
-        f"at {factor:g} {one.violations} of {one.runs} ({rounded_down(one.lower)} to "
+        f"at {factor:g}: {one.violations} of {one.runs} ({rounded_down(one.lower)} to "
         f"{rounded_up(one.upper)})"
         for factor, one in bounds.items()
     )

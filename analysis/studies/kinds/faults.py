@@ -32,7 +32,7 @@ from ..file.asked import Asked, Flag, Names, Size
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
-from ..page.text import DID_NOT_END, margin_text
+from ..page.text import DID_NOT_END, margin_in_words, margin_text
 from ..result import Result
 
 TOGETHER = 256  # unfinished runs that are simulated again in batches
@@ -229,10 +229,10 @@ def _finding(asked: Faults, effects: pd.DataFrame) -> Finding:
     ]
     worst = single.sort_values("margin", kind="stable").to_dict("records")[0]
     words = (
-        f"The loop without a fault {'meets' if alone > 0 else 'already violates'} the spec (margin "
-        f"{margin_text(alone)}). "
+        f"The loop without a fault {'meets' if alone > 0 else 'already violates'} the spec ("
+        f"{margin_in_words(alone)}). "
         f"{some_of(len(bad), len(single), 'single fault', 'violates', 'violate')} it; the worst is "
-        f"{worst['first']} at {worst['onset']:g} s ({_in_words(worst['margin'])})."
+        f"{worst['first']} at {worst['onset']:g} s ({margin_in_words(worst['margin'])})."
     )
     if asked.pairs:
         words += (
@@ -276,11 +276,6 @@ def _detection(asked: Faults, effects: pd.DataFrame) -> str:
     return words
 
 
-def _in_words(margin: float) -> str:
-    text = margin_text(margin)
-    return f"its run {text}" if text == DID_NOT_END else f"margin {text}"
-
-
 def _answer(asked: Faults, violating: pd.DataFrame) -> dict[str, str]:
     """Return the answer to the claim that faults are tolerated."""
     if not asked.tolerates:
@@ -294,7 +289,10 @@ def _measured(finding: Finding, asked: Faults) -> dict[str, str]:
     every = _single(effects).sort_values("margin", kind="stable").to_dict("records")
     least = next(row for row in every if row["first"] in asked.tolerates)
     margin = margin_text(least["margin"])
-    measured = f"least margin {margin} (1), {least['first']}"
+    if margin == DID_NOT_END:
+        measured, margin = f"a run that did not reach its end, {least['first']}", ""
+    else:
+        measured = f"least margin {margin} (1), {least['first']}"
     return {"measured": measured, "limit": "> 0", "margin": margin}
 
 

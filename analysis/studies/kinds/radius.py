@@ -17,7 +17,7 @@ from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
-from ..page.text import margin_text
+from ..page.text import margin_in_words, margin_text
 from ..result import Result
 from .context import AUGER, CLOPPER, HANSEN, SEARCHED, statement_numbers
 
@@ -86,7 +86,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     measured = f"violation at size {n['upper']:.4g}"
     if n["upper"] == 0:
-        measured = f"the nominal values violate, margin {margin_text(n['margin'])}"
+        measured = f"the nominal values violate, {margin_in_words(n['margin'])}"
     elif n["witness"] is None:
         measured = f"no violation found up to size {n['largest']:.4g}"
     return {

@@ -38,14 +38,14 @@ from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
-from ..page.text import margin_text
+from ..page.text import DID_NOT_END, margin_text
 from ..result import Result
 from .context import CLOPPER, statement_numbers
 
 _BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
 _TRIED = "What every choice of gains was worth on the samples that gains were found on."
 _BOUGHT = (
-    "What each gain has bought, on these samples: with this one alone as found, and with all but "
+    "What each gain contributes, on these samples: with this one alone as found, and with all but "
     "this one. What lies far outside is cut off."
 )
 _FRESH = "Share of the fresh rows with at most that margin, with the same rows before and after."
@@ -195,8 +195,8 @@ def _sentence(asked: Tuning, tuned: Tuned, before: Violation, after: Violation) 
         for name, new, old in zip(tuned.names, tuned.values, tuned.start, strict=True)
     )
     numbers = "; ".join(
-        f"the {_what(tuned, key)} is {margin_text(tuned.before[key])} before and "
-        f"{margin_text(tuned.after[key])} after"
+        f"the {_what(tuned, key)} is {_size(tuned.before[key])} before and "
+        f"{_size(tuned.after[key])} after"
         for key in tuned.after
     )
     runs = (
@@ -209,6 +209,11 @@ def _sentence(asked: Tuning, tuned: Tuned, before: Violation, after: Violation) 
         f"rows {before.violations} of {before.runs} violate the spec with the gains as they were; "
         f"with those that were found {after}"
     )
+
+
+def _size(margin: float) -> str:
+    text = margin_text(margin)
+    return "that of a run that did not end" if text == DID_NOT_END else text
 
 
 def _what(tuned: Tuned, key: str) -> str:
@@ -261,14 +266,14 @@ def _measured(finding: Finding, asked: Tuning) -> dict[str, str]:
 
 
 def _items(finding: Finding, result: Result, asked: Tuning, key: str) -> Iterator[Item]:
-    """Yield before and after, which gain has bought what, and how it was found."""
+    """Yield before and after, which gain contributes what, and how it was found."""
     n, tables = finding.numbers, finding.tables
     is_cost = n["goal"] != "margin"
     what = f"mean {n['goal']}" if is_cost else "least margin"
     gains = tables["gains"]
     columns = {"before": "before", "after": "after", "low": "from", "high": "to"}
     columns |= {"alone": f"{what} with it alone", "put_back": f"{what} with all but it"}
-    yield result_table(gains, "The gains, and what each has bought.", columns)
+    yield result_table(gains, "The gains, and what each contributes.", columns)
     lines = "\n".join(f'"{name}" = {value!r}' for name, value in n["gains"].items())
     yield Paragraph(text="The gains that were found:", code=lines)
     signals = tables["signals"]

@@ -24,7 +24,7 @@ from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
-from ..page.text import DID_NOT_END, margin_text, status_text
+from ..page.text import DID_NOT_END, margin_in_words, margin_text, status_text
 from ..result import Result
 from .context import AUGER, HANSEN, SEARCHED
 
@@ -115,7 +115,7 @@ def _items(finding: Finding, result: Result, asked: AskedWorstCase, key: str) ->
     yield captioned(
         f"{key}-search",
         caption,
-        f"After {counted(lowest.size, 'run')} it is {margin_text(lowest[-1])}.",
+        f"After {counted(lowest.size, 'run')}: {margin_in_words(lowest[-1])}.",
         figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
     )
     if "replays" in finding.tables:

@@ -62,6 +62,12 @@ def margin_text(value: float) -> str:
     return f"{value:.4g}" if value > -FAILED else DID_NOT_END
 
 
+def margin_in_words(value: float) -> str:
+    """Return a margin as part of a sentence, or that its run did not reach its end."""
+    text = margin_text(value)
+    return "the run did not end" if text == DID_NOT_END else f"margin {text}"
+
+
 def status_text(name: object) -> str:
     """Return how a run ended, in words."""
     return "reached the end" if name == Status.OK.name else str(name).lower().replace("_", " ")

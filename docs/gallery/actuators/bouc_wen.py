@@ -27,6 +27,6 @@ axes.plot(path * 1e3, forces[0])
 axes.set(xlabel="displacement (mm)", ylabel="force (N)")
 
 rise = t <= 0.5
-known = record.z_max * (1 - np.exp(-record.beta * (record.gamma + record.delta) * path[rise]))
-assert np.abs(forces[0][rise] - known).max() < 1e-4 * record.z_max
+exact = record.z_max * (1 - np.exp(-record.beta * (record.gamma + record.delta) * path[rise]))
+assert np.abs(forces[0][rise] - exact).max() < 1e-4 * record.z_max
 assert np.abs(forces[1] - forces[0]).max() < 1e-4 * record.z_max

@@ -30,15 +30,15 @@ play = nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=c, c_l=-c)
 loop = nlctl.interconnect({"source": source, "play": play}, outputs=["u", "v"])
 
 t = np.linspace(0, 8, 401)
-made = nlctl.sensitivity_response(
+slopes = nlctl.sensitivity_response(
     loop, t, of=["v"], with_respect_to=["source.A", "play.c_r", "play.c_l"]
 )
 
 figure, (above, below) = plt.subplots(2, sharex=True, figsize=(6, 4.5), layout="constrained")
 above.plot(t, A * np.sin(t), "0.6", label="u")
-above.plot(t, made.values[0], label="v")
-for name in made.with_respect_to:
-    below.plot(t, made["v", name], label=f"by {name}")
+above.plot(t, slopes.values[0], label="v")
+for name in slopes.with_respect_to:
+    below.plot(t, slopes["v", name], label=f"by {name}")
 above.set(ylabel="signals")
 below.set(ylabel="derivative of v", xlabel="t (s)", xlim=(0, 8))
 above.legend()
@@ -48,10 +48,10 @@ touches = np.arcsin(c / A)  # the right side, from within the gap
 leaves = np.pi - np.arcsin(1 - 2 * c / A)  # the gap, on its left side
 rises, stands = (t > touches) & (t < np.pi / 2), (t > np.pi / 2) & (t < leaves)
 falls = (t > leaves) & (t < 3 * np.pi / 2)
-by_a, by_c = made["v", "source.A"], made["v", "play.c_r"]
-known = np.select([rises, stands, falls], [np.sin(t), 1.0, np.sin(t)])
-known_c = np.select([rises, stands], [-1.0, -1.0])
-own = rises | stands | falls
-furthest = max(abs(by_a - known)[own].max(), abs(by_c - known_c)[own].max())
+by_a, by_c = slopes["v", "source.A"], slopes["v", "play.c_r"]
+exact = np.select([rises, stands, falls], [np.sin(t), 1.0, np.sin(t)])
+exact_c = np.select([rises, stands], [-1.0, -1.0])
+follows = rises | stands | falls
+furthest = max(abs(by_a - exact)[follows].max(), abs(by_c - exact_c)[follows].max())
 print(f"furthest from the closed form by {furthest:.0e}")
 assert furthest < 1e-7

@@ -22,7 +22,7 @@ shown = {
     "PrandtlIshlinskii": nlctl.actuators.PrandtlIshlinskii(w=w, r=r),
     "Preisach": nlctl.actuators.Preisach(alpha=alpha, beta=beta, w=(1 / len(alpha),) * len(alpha)),
 }
-known = {
+exact = {
     "Relay": 4 * 0.7 * 1.0,
     "Stop": 4 * 1.0 * (A - 1.0),
     "PrandtlIshlinskii": sum(a * 4 * b * (A - b) for a, b in zip(w, r, strict=True)),
@@ -35,5 +35,5 @@ for ax, (name, record) in zip(axes.flat, shown.items(), strict=True):
     ax.set_title(name, fontsize="medium")
     late = t >= 2 * np.pi  # the second period is closed
     area = abs(np.trapezoid(v[late], u[late]))
-    print(f"{name}: {area:.4f}, closed form {known[name]:.4f}")
-    assert abs(area - known[name]) < 5e-3 * known[name]
+    print(f"{name}: {area:.4f}, closed form {exact[name]:.4f}")
+    assert abs(area - exact[name]) < 5e-3 * exact[name]

@@ -40,8 +40,8 @@ loop = ct.interconnect(
     outlist=["wave.yd", "inverse.v", "gap.v"],
     outputs=["u", "v", "y"],
 )
-wanted, needed, y = nlctl.input_output_response(loop, t).outputs
+reference, command, y = nlctl.input_output_response(loop, t).outputs
 late = t > 3.0
-print(f"{np.abs(y - wanted)[late].max():.1e} off, jumps of {np.abs(np.diff(needed)).max():.2f}")
-assert np.abs(y - wanted)[late].max() < 1e-6
-assert np.abs(np.diff(needed)).max() > 1.0
+print(f"{np.abs(y - reference)[late].max():.1e} off, jumps of {np.abs(np.diff(command)).max():.2f}")
+assert np.abs(y - reference)[late].max() < 1e-6
+assert np.abs(np.diff(command)).max() > 1.0

@@ -39,7 +39,7 @@ remedies = {
     "e-modification": controllers.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=0.05),
     "projection": controllers.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5, width=0.1),
 }
-t, found = np.linspace(0, 2000, 4001), {}
+t, norms = np.linspace(0, 2000, 4001), {}
 figure, axes = plt.subplots(figsize=(6, 3))
 model, law = controllers.ReferenceModel(a=(k,), b=0.0), controllers.ModelReferenceLaw(gain=1.0)
 for label, weights in remedies.items():
@@ -47,13 +47,13 @@ for label, weights in remedies.items():
     blocks = {"nothing": nothing, "plant": plant, "controller": controller, "a": nlctl.Gain()}
     loop = nlctl.interconnect(blocks, outputs=["x1", "W_norm"])
     start = nlctl.initial_state(loop, {"plant.x1": x_0, "controller.weights.W_hat[0]": 1.0})
-    x, found[label] = nlctl.input_output_response(loop, t, 0, start).outputs
-    axes.plot(t, found[label], label=label)
+    x, norms[label] = nlctl.input_output_response(loop, t, 0, start).outputs
+    axes.plot(t, norms[label], label=label)
 axes.set(xlabel="t (s)", ylabel=r"$|\hat{W}|$", ylim=(None, 6))
 axes.legend(ncols=2, loc="upper left")
 
 # %%
 # The closed form of the drift to infinity, and the bounds of those that do not drift.
-print({label: round(float(norm[-1]), 3) for label, norm in found.items()})
-assert np.abs(found["gradient"] - (1 + t) ** 0.2).max() < 1e-3 * found["gradient"].max()
-assert found["projection"].max() <= 2.5
+print({label: round(float(norm[-1]), 3) for label, norm in norms.items()})
+assert np.abs(norms["gradient"] - (1 + t) ** 0.2).max() < 1e-3 * norms["gradient"].max()
+assert norms["projection"].max() <= 2.5

@@ -34,22 +34,24 @@ compared = {
     },
     "concurrent": {"weights": controllers.ConcurrentWeights(nodes=6, Gamma=5.0), "stack": stack},
 }  # fmt: skip
-t, found, late = np.linspace(0, 60, 1201), {}, {}
+t, weights, late = np.linspace(0, 60, 1201), {}, {}
 figure, axes = plt.subplots(1, 2, sharey=True, figsize=(7, 3))
-for label, own in compared.items():
-    loop = nlctl.interconnect({**common, **own}, outputs=["e", "W_norm"])
+for label, controller in compared.items():
+    loop = nlctl.interconnect({**common, **controller}, outputs=["e", "W_norm"])
     response = nlctl.input_output_response(loop, t)
     states = dict(zip(nlctl.state_names(loop), response.states, strict=True))
-    found[label] = np.array([states[f"weights.W_hat[{i}]"] for i in range(6)])
+    weights[label] = np.array([states[f"weights.W_hat[{i}]"] for i in range(6)])
     late[label] = float(np.abs(response.outputs[0][t > 50]).max())
 for axis, label in zip(axes, ("MRAC", "concurrent"), strict=True):
-    axis.plot(t, found[label].T)
+    axis.plot(t, weights[label].T)
     axis.hlines(W, 0, 60, "k", "dotted", linewidth=0.8)
     axis.set(title=label, xlabel="t (s)")
 
 # %%
 # All three track; only concurrent learning has the weights (dotted) to three decimals.
-print({label: f"{error:.1e}" for label, error in late.items()}, found["concurrent"][:, -1].round(4))
+print(
+    {label: f"{error:.1e}" for label, error in late.items()}, weights["concurrent"][:, -1].round(4)
+)
 assert max(late.values()) < 1e-6
-assert np.abs(found["concurrent"][:, -1] - W).max() < 1e-3
-assert np.abs(found["MRAC"][:, -1] - W).max() > 0.5
+assert np.abs(weights["concurrent"][:, -1] - W).max() < 1e-3
+assert np.abs(weights["MRAC"][:, -1] - W).max() > 0.5

@@ -36,8 +36,8 @@ for (name, curve), style in zip(force.items(), ("-", "-", "--", "o"), strict=Tru
 axes.set(xlabel="velocity (m/s)", ylabel="force (N)")
 axes.legend()
 
-known = 1 + 0.5 * np.exp(-((velocities / 1e-3) ** 2)) + 0.4 * velocities
-assert np.allclose(force["Stribeck"], known)
-assert np.allclose(force["LuGre"], known, rtol=1e-6)
+exact = 1 + 0.5 * np.exp(-((velocities / 1e-3) ** 2)) + 0.4 * velocities
+assert np.allclose(force["Stribeck"], exact)
+assert np.allclose(force["LuGre"], exact, rtol=1e-6)
 assert np.allclose(force["Dahl"], 1.0, rtol=1e-6)
 assert np.allclose(force["Coulomb"], 1 + 0.4 * velocities)

@@ -31,11 +31,11 @@ def areas(omega):
     return np.trapezoid(force[late], v[late]), np.trapezoid(slow[late], t[late])
 
 
-found = {omega: areas(omega) for omega in (0.3, 1.0, 10.0, 25.0)}
+loops = {omega: areas(omega) for omega in (0.3, 1.0, 10.0, 25.0)}
 axes.set(xlabel="velocity (mm/s)", ylabel="friction (N)")
 axes.legend()
-for omega, (area, slow) in found.items():
+for omega, (area, slow) in loops.items():
     print(f"{omega:4.1f} rad/s: area {1e6 * area:.3f} mN mm/s, to first order {1e6 * slow:.3f}")
-assert abs(found[0.3][0] / found[0.3][1] - 1) < 1e-3
-assert abs(found[1.0][0] / found[1.0][1] - 1) < 1e-3
-assert np.all(np.diff([area for area, _ in found.values()]) > 0)
+assert abs(loops[0.3][0] / loops[0.3][1] - 1) < 1e-3
+assert abs(loops[1.0][0] / loops[1.0][1] - 1) < 1e-3
+assert np.all(np.diff([area for area, _ in loops.values()]) > 0)

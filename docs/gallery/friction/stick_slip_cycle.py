@@ -41,9 +41,9 @@ axes.set(xlabel="t (s)", ylabel="spring (m)")
 
 omega = np.sqrt(k / m)
 s = (F_s - F_c) * omega / (k * V)
-known = 2 / omega * (np.pi - np.arctan(s) + s)
+exact = 2 / omega * (np.pi - np.arctan(s) + s)
 middle = (stretch[:-1] < 0.25) & (stretch[1:] >= 0.25)
 times = t[1:][middle]
 period = (times[-1] - times[2]) / (times.size - 3)
-print(f"period {period:.4f} s, closed form {known:.4f} s")
-assert abs(period - known) < 2e-3
+print(f"period {period:.4f} s, closed form {exact:.4f} s")
+assert abs(period - exact) < 2e-3

@@ -40,12 +40,12 @@ axes.set(xlabel="t (s)", ylabel="height (m)", ylim=(0, 1.02), xlim=(0, 3.5))
 axes.legend()
 
 t0, e = np.sqrt(2 / 9.81), 0.8
-known = t0 + 2 * t0 * np.r_[0, np.cumsum(e ** np.arange(1, bounces.size))]
+exact = t0 + 2 * t0 * np.r_[0, np.cumsum(e ** np.arange(1, bounces.size))]
 print(
-    f"{bounces.size} bounces, furthest from the closed form by {abs(bounces - known).max():.0e} s"
+    f"{bounces.size} bounces, furthest from the closed form by {abs(bounces - exact).max():.0e} s"
 )
 assert bounces.size > 5
-assert abs(bounces - known).max() < 1e-8
+assert abs(bounces - exact).max() < 1e-8
 
 zeno = None
 try:

@@ -39,10 +39,10 @@ axes.plot(samples, np.interp(samples, t, x), "k.", label="samples")
 axes.set(xlabel="t (s)", ylabel="state (1)", xlim=(0, 2), ylim=(0, 1.02))
 axes.legend()
 
-known = np.log(2 - 1 / 1.3)
+exact = np.log(2 - 1 / 1.3)
 apart = np.diff(samples)
-print(f"{samples.size} samples, {known:.6f} s apart, to {abs(apart - known).max():.0e} s")
+print(f"{samples.size} samples, {exact:.6f} s apart, to {abs(apart - exact).max():.0e} s")
 print(f"as a signal of the diagram: {interval[-1]:.6f} s")
 assert samples.size > 5
-assert abs(apart - known).max() < 1e-6
-assert abs(interval[-1] - known) < 1e-6
+assert abs(apart - exact).max() < 1e-6
+assert abs(interval[-1] - exact) < 1e-6

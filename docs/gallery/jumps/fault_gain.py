@@ -24,9 +24,9 @@ x = nlctl.input_output_response(faulty, t, rtol=1e-10, atol=1e-12).outputs[0]
 
 before = 0.8 * (1 - np.exp(-5 * t))
 after = 2 / 3 + (0.8 * (1 - np.exp(-10)) - 2 / 3) * np.exp(-3 * (t - 2))
-known = np.where(t < 2, before, after)
+exact = np.where(t < 2, before, after)
 figure, axes = plt.subplots(figsize=(6, 3))
 axes.plot(t, x)
-axes.plot(t[::200], known[::200], "o", markersize=4)
+axes.plot(t[::200], exact[::200], "o", markersize=4)
 axes.set(xlabel="t (s)", ylabel="x")
-assert np.abs(x - known).max() < 1e-8
+assert np.abs(x - exact).max() < 1e-8

@@ -45,12 +45,12 @@ part.set(xlabel="t (s)", ylabel="y (1)", xlim=(0.3, 0.4), ylim=(0.63, 0.75))
 whole.legend(loc="upper right", ncols=2)
 part.legend(loc="upper left")
 
-value, known = 0.0, [0.0]
+value, exact = 0.0, [0.0]
 for start in T * np.arange(75):  # up while the pulse lasts, down for the rest of its period
     width = brentq(lambda s, start=start: s - T * duty(start + s), 0, T, xtol=1e-15)
     value = (1 + (value - 1) * np.exp(-RATE * width)) * np.exp(-RATE * (T - width))
-    known.append(value)
+    exact.append(value)
 print(compiled)
-print(f"{events.size} events, y off by {abs(y[::20] - known).max():.0e}")
-assert abs(y[::20] - known).max() < 1e-7
+print(f"{events.size} events, y off by {abs(y[::20] - exact).max():.0e}")
+assert abs(y[::20] - exact).max() < 1e-7
 assert events.size == 149

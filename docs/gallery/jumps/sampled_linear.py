@@ -25,11 +25,11 @@ for value in held:  # one run for each interval in which the input is constant
         continuous, [0, period], value, x, rtol=1e-10, atol=1e-12, return_states=True
     )
     x = part.states[:, -1]
-known = nlctl.input_output_response(discrete, period * k, held).outputs
+discretised = nlctl.input_output_response(discrete, period * k, held).outputs
 
 figure, axes = plt.subplots(figsize=(5, 3))
-axes.step(period * k, known, where="post", label="discrete")
+axes.step(period * k, discretised, where="post", label="discrete")
 axes.plot(period * k, samples, "o", markersize=4, label="continuous, at the samples")
 axes.set(xlabel="t (s)", ylabel="y")
 axes.legend()
-assert np.abs(np.array(samples) - known).max() < 1e-8
+assert np.abs(np.array(samples) - discretised).max() < 1e-8

@@ -18,11 +18,11 @@ record = nlctl.DeadZone(slope_r=1.0, slope_l=1.0, ripple_r=0.0, ripple_l=0.0, b_
 actuator = nlctl.block(record, "actuator")
 A = np.linspace(0.6, 5, 23)
 computed = ct.describing_function(actuator, A).real  # by simulation, with break points located
-known = 1 - 2 / np.pi * (np.arcsin(d / A) + d / A * np.sqrt(1 - (d / A) ** 2))
+exact = 1 - 2 / np.pi * (np.arcsin(d / A) + d / A * np.sqrt(1 - (d / A) ** 2))
 
 figure, axes = plt.subplots(figsize=(4.5, 3))
-axes.plot(A, known, label="closed form")
+axes.plot(A, exact, label="closed form")
 axes.plot(A, computed, "o", markersize=4, label="of the block")
 axes.set(xlabel="A", ylabel="gain of the first harmonic")
 axes.legend()
-assert np.abs(computed - known).max() < 1e-8
+assert np.abs(computed - exact).max() < 1e-8

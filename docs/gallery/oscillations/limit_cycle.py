@@ -20,8 +20,8 @@ G = ct.tf([1], [1, 1, 0])
 A = np.linspace(0.12, 1.5, 40)
 
 N = ct.describing_function(relay, A)
-known = 4 / (np.pi * A) * (np.sqrt(1 - (delta / A) ** 2) - 1j * delta / A)
-assert np.abs(N - known).max() < 1e-6
+exact = 4 / (np.pi * A) * (np.sqrt(1 - (delta / A) ** 2) - 1j * delta / A)
+assert np.abs(N - exact).max() < 1e-6
 
 
 def switching(h):

@@ -48,8 +48,8 @@ t = np.linspace(0, 20, 20_001)
 u, v = nlctl.input_output_response(nlctl.compile(loop), t, rtol=1e-9, atol=1e-11).outputs
 plt.figure(figsize=(6, 3))
 plt.plot(t, -u, t, v)
-known = 2 * T * np.log((k * h + a) / (k * h - a))
+exact = 2 * T * np.log((k * h + a) / (k * h - a))
 up = np.nonzero((u[:-1] < 0) & (u[1:] >= 0))[0]
 period = np.diff(t[up] - u[up] * 1e-3 / (u[up + 1] - u[up]))[2:].mean()
-print(f"period {period:.6f} s, Tsypkin {known:.6f} s")
-assert abs(period - known) < 1e-4
+print(f"period {period:.6f} s, Tsypkin {exact:.6f} s")
+assert abs(period - exact) < 1e-4

@@ -23,5 +23,7 @@ for actuator in (nlctl.DeadZone(), nlctl.Backlash()):
 axes.set(xlabel="t (s)", ylabel="e")
 axes.legend()
 
-known = next(x.value for x in expectations() if (x.case, x.metric) == ("1-backlash", "tail_max_e"))
-assert abs(np.abs(errors["Backlash"][t >= 10]).max() - known) < 1e-4
+expected = next(
+    x.value for x in expectations() if (x.case, x.metric) == ("1-backlash", "tail_max_e")
+)
+assert abs(np.abs(errors["Backlash"][t >= 10]).max() - expected) < 1e-4

@@ -28,7 +28,7 @@ below.set(ylabel="zeta", xlabel="t (s)")
 
 # %%
 # The largest late error agrees with an independent computation of the same equations.
-known = next(x.value for x in expectations() if (x.case, x.metric) == ("2", "tail_max_e"))
+expected = next(x.value for x in expectations() if (x.case, x.metric) == ("2", "tail_max_e"))
 late = np.abs(e[t >= 10]).max()
-print(f"late |e| at most {late:.5f}, expected {known:.5f}")
-assert abs(late - known) < 2e-5
+print(f"late |e| at most {late:.5f}, expected {expected:.5f}")
+assert abs(late - expected) < 2e-5

@@ -27,11 +27,11 @@ def update(t, x, u, params):
 cart = ct.nlsys(update, None, states=4, inputs=["force"], name="cart")
 exact = nlctl.compile(cart).linearize(np.zeros(4))
 by_differences = ct.linearize(cart, np.zeros(4), [0.0])
-known = np.sqrt((M + m) * g / (M * length))
+closed = np.sqrt((M + m) * g / (M * length))
 poles = np.sort(exact.poles().real)
 figure, axes = plt.subplots(figsize=(4.5, 3))
 axes.plot(exact.poles().real, exact.poles().imag, "x")
 axes.set(xlabel="Re (1/s)", ylabel="Im (1/s)", title="Poles")
-print(poles, known)
-assert np.abs(poles[[0, -1]] - [-known, known]).max() < 1e-12
+print(poles, closed)
+assert np.abs(poles[[0, -1]] - [-closed, closed]).max() < 1e-12
 assert np.abs(by_differences.A - exact.A).max() < 1e-4

@@ -4,7 +4,7 @@ A tuned loop
 
 A PID controller for the plant and the dead zone of Example 1, whose gains leave error and input the largest distance to their
 bounds: of :math:`|e| \leq 0.15` from 10 s on and :math:`|u| \leq 30` the least margin counts. ``nlctl.tune`` takes the
-derivatives of runs (through the dead zone), so that a few runs are enough, and says what each gain has bought: the loop
+derivatives of runs (through the dead zone), so that a few runs are enough, and says what each gain contributes: the loop
 before with it alone, and the loop after without it. What is found is the best of what was tried; ``nlctl tune study.toml``
 also runs it on fresh samples.
 """
@@ -24,12 +24,12 @@ spec = [
     Requirement(key="moderate", formula=moderate, until=20),
 ]
 space = {f"controller.{k}": (0.1, 100) for k in ("k_p", "k_i", "k_d")}
-found = nlctl.tune(loop, space, spec, budget=60, starts=1)
-print(found)
+tuned = nlctl.tune(loop, space, spec, budget=60, starts=1)
+print(tuned)
 
 t = np.linspace(0, 20, 1001)
 before = nlctl.input_output_response(loop, t)
-after = nlctl.input_output_response(loop, t, params=found.params)
+after = nlctl.input_output_response(loop, t, params=tuned.params)
 names = list(loop.system.output_labels)
 
 figure, (error, control, gains) = plt.subplots(3, figsize=(6, 7), layout="constrained")
@@ -40,8 +40,8 @@ for ax, name, bound in ((error, "e", 0.15), (control, "u", 30)):
         ax.hlines(side, 10 if name == "e" else 0, 20, color="0.6")
     ax.set(xlabel="t (s)", ylabel=name, xlim=(0, 20))
 error.legend()
-table, at = found.to_pandas(), np.arange(len(space))
-before, after = found.margin_before, found.margin
+table, at = tuned.to_pandas(), np.arange(len(space))
+before, after = tuned.margin_before, tuned.margin
 gains.barh(at - 0.2, table["alone"] - before, 0.36, left=before, label="it alone")
 gains.barh(at + 0.2, table["put_back"] - after, 0.36, left=after, label="all but it")
 gains.axvline(before, color="0.6", ls="--")
@@ -52,4 +52,4 @@ gains.set_xlabel("least margin: before (dashed), after, and with one gain change
 gains.legend(loc="lower left")
 
 assert before < 0 < 0.4 < after
-assert found.counted_runs < 100
+assert tuned.counted_runs < 100

@@ -30,7 +30,7 @@ axes.legend()
 
 # %%
 # The bound is :math:`C_{0} = \sqrt{2 \max\{V(0), \alpha_{0}/\alpha_{1}\}}` of the paper's (36), with enclosed constants:
-known = np.sqrt(2 * max(certificate.V_0, certificate.alpha_0 / certificate.alpha_1))
-print(f"C_0 = {certificate.C_0:.4f}, by the formula {known:.4f}; the run has {np.abs(r).max():.4f}")
-assert abs(certificate.C_0 - known) < 1e-9
+bound = np.sqrt(2 * max(certificate.V_0, certificate.alpha_0 / certificate.alpha_1))
+print(f"C_0 = {certificate.C_0:.4f}, by the formula {bound:.4f}; the run has {np.abs(r).max():.4f}")
+assert abs(certificate.C_0 - bound) < 1e-9
 assert np.abs(r).max() < certificate.C_0

@@ -35,21 +35,21 @@ loop = nlctl.compile(
 truth = {"gap.c_r": 0.4, "gap.c_l": -0.3, "gap.m_r": 1.1, "gap.m_l": 1.1, "plant.T": 0.7}
 t, noise = np.linspace(0, 12, 241), np.random.default_rng(1).normal(size=241)
 y = nlctl.input_output_response(loop, t, params=truth, squeeze=True).outputs + 0.02 * noise
-found = nlctl.fit(loop, t, {"y": y}, {name: 0.8 * value for name, value in truth.items()})
-print(found)
+fitted = nlctl.fit(loop, t, {"y": y}, {name: 0.8 * value for name, value in truth.items()})
+print(fitted)
 
 figure, (above, below) = plt.subplots(2, figsize=(6, 5), layout="constrained")
 above.plot(t, y, ".", ms=3, label="data")
-above.plot(t, found.response.values[0], label="fit")
+above.plot(t, fitted.response.values[0], label="fit")
 above.set(xlabel="t (s)", ylabel="y", xlim=(0, 12))
 above.legend()
-apart = found.values - np.array(list(truth.values()))
-below.errorbar(apart, found.names, xerr=2 * found.errors, fmt="o")
+apart = fitted.values - np.array(list(truth.values()))
+below.errorbar(apart, fitted.names, xerr=2 * fitted.errors, fmt="o")
 below.axvline(0, color="0.6")
 below.set(xlabel="value less the truth, with two standard errors")
 
-assert np.all(abs(apart) < 4 * found.errors)
-assert abs(found.noise - 0.02) < 0.004
+assert np.all(abs(apart) < 4 * fitted.errors)
+assert abs(fitted.noise - 0.02) < 0.004
 both = nlctl.fit(loop, t, {"y": y}, truth | {"plant.k": 1.0})
 print("not identifiable:", both.unidentifiable)
 assert {"plant.k", "gap.m_r", "gap.m_l"} <= set(both.unidentifiable)

@@ -31,16 +31,16 @@ start = {"gap.c_r": 0.6, "gap.c_l": -0.6, "lag.v(0)": 0.0}
 alone = [nlctl.fit(drive, data=push, parameters=start) for push in pushes]
 for push, one in zip(pushes, alone, strict=True):
     print(push.name, "alone leaves open:", one.unidentifiable)
-found = nlctl.fit(drive, data=pushes, parameters=start, separate=["lag.v(0)"])
-print(found)
+fitted = nlctl.fit(drive, data=pushes, parameters=start, separate=["lag.v(0)"])
+print(fitted)
 
 figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-for push, experiment in zip(pushes, found.experiments, strict=True):
+for push, experiment in zip(pushes, fitted.experiments, strict=True):
     axes.plot(push.data["y"], ".", ms=3, color="0.6")
     axes.plot(t, experiment.response.values[0], label=experiment.name)
 axes.set(xlabel="t (s)", ylabel="y", xlim=(0, 3))
 axes.legend(title="pushed to the")
 
 assert [one.unidentifiable for one in alone] == [("gap.c_l",), ("gap.c_r",)]
-assert found.unidentifiable == ()
-assert np.all(abs(found.values[:2] - list(ends.values())) < 4 * found.errors[:2])
+assert fitted.unidentifiable == ()
+assert np.all(abs(fitted.values[:2] - list(ends.values())) < 4 * fitted.errors[:2])

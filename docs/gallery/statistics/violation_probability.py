@@ -39,11 +39,11 @@ spec = rb.Spec(requirements=(rb.Requirement(key="decays", formula=small, until=1
 times = np.linspace(0, 1, 11)
 prepared = rb.prepare(rb.Experiment(space=space, build=loop, timepts=times, spec=spec))
 runs = rb.sweep(prepared, rb.independent(prepared.experiment.space, 4000, entropy=1))
-found = rb.violation_probability(runs.design, runs.table["spec"], side="both")
-print(found)
+estimate = rb.violation_probability(runs.design, runs.table["spec"], side="both")
+print(estimate)
 
 figure, axes = plt.subplots(figsize=(5, 3))
 axes.hist(runs.table["spec"], bins=40)
 axes.axvline(0, color="black")
 axes.set(xlabel="margin", ylabel="runs", title="Violations left of zero")
-assert found.lower < 0.05 < found.upper
+assert estimate.lower < 0.05 < estimate.upper

@@ -31,7 +31,7 @@ figure, axes = plt.subplots(figsize=(6, 3))
 axes.plot(t[10:], x[6, 10:] / t[10:])
 axes.axhline(0.9056, color="black", linewidth=0.8)
 axes.set(xlabel="t (s)", ylabel="exponent so far (1/s)", ylim=(0.7, 1.1))
-found = (x[6, -1] - x[6, 200]) / (t[-1] - t[200])
-print(f"{found:.3f}")
-assert abs(found - 0.9056) < 0.02
+exponent = (x[6, -1] - x[6, 200]) / (t[-1] - t[200])
+print(f"{exponent:.3f}")
+assert abs(exponent - 0.9056) < 0.02
 assert np.allclose((x[3:6] ** 2).sum(axis=0), 1, atol=1e-3)  # the length stays 1

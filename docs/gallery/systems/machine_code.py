@@ -24,12 +24,12 @@ loop = ct.interconnect([plant, law], name="loop", inputs=["ref"], outputs=["y"])
 t = np.linspace(0, 2, 201)
 native = nlctl.input_output_response(nlctl.compile(loop), t, 1.0, rtol=1e-9, atol=1e-12)
 plain = ct.input_output_response(loop, t, 1.0, solve_ivp_kwargs={"rtol": 1e-9, "atol": 1e-12})
-known = 4 / 5 * (1 - np.exp(-5 * t))
+exact = 4 / 5 * (1 - np.exp(-5 * t))
 
 figure, axes = plt.subplots(figsize=(5, 3))
-axes.plot(t, known, label="closed form")
+axes.plot(t, exact, label="closed form")
 axes.plot(t[::10], native.outputs[::10], "o", markersize=4, label="machine code")
 axes.set(xlabel="t (s)", ylabel="y")
 axes.legend()
-assert np.abs(native.outputs - known).max() < 1e-8
-assert np.abs(plain.outputs - known).max() < 1e-7
+assert np.abs(native.outputs - exact).max() < 1e-8
+assert np.abs(plain.outputs - exact).max() < 1e-7

@@ -22,8 +22,8 @@ def swing(x, v):
 
 
 plant = nlctl.block(nlctl.PureFeedback(order=2, f=swing, initial={"x1": start}), "plant")
-known = 4 * np.sqrt(length / g) * ellipk(np.sin(start / 2) ** 2)
-t = np.linspace(0, 3 * known, 3001)
+exact = 4 * np.sqrt(length / g) * ellipk(np.sin(start / 2) ** 2)
+t = np.linspace(0, 3 * exact, 3001)
 response = nlctl.input_output_response(plant, t, 0, rtol=1e-10, atol=1e-12)
 angle = response.states[0]
 
@@ -31,6 +31,6 @@ figure, axes = plt.subplots(figsize=(5, 3))
 axes.plot(t, angle)
 axes.set(xlabel="t (s)", ylabel="angle (rad)")
 
-print(f"period {known:.6f} s")
+print(f"period {exact:.6f} s")
 assert isinstance(plant, ct.NonlinearIOSystem)
 assert np.abs(angle[[1000, 2000, 3000]] - start).max() < 1e-6

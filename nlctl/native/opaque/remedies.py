@@ -33,7 +33,7 @@ _REMEDIES = (
      "fewer cases in one function: np.where or a table instead of if, or several blocks"),
     (r"mask|indexing|assign|places in|reshap", "np.where(condition, one, other) of whole arrays"),
 )  # fmt: skip
-_OTHERWISE = "write it by functions of NumPy that are, or put it into a block of its own"
+_OTHERWISE = "write it by functions of NumPy that are traced, or put it into a block of its own"
 
 
 def remedy_of(reason: str) -> str:

@@ -125,7 +125,7 @@ def recorded(value: Any) -> Any:
         return _Kept(type(value), tuple(map(recorded, value)))
     if isinstance(value, set | frozenset):
         return _Kept(type(value), frozenset(value))
-    if isinstance(value, np.poly1d) or type(value).__module__.startswith(_TABLES):
+    if isinstance(value, np.poly1d) or _is_of_tables(value):
         return _Content(value, {k: recorded(v) for k, v in _content(value).items()})
     return value.copy() if _is_table(value) else value
 
@@ -159,9 +159,15 @@ class _Content:
 
 
 def _content(value: Any) -> dict[str, Any]:
-    """Return the numbers and containers that an object of a library holds."""
-    plain = np.ndarray, tuple, list, *PLAIN
-    return {k: v for k, v in attributes_of(value).items() if isinstance(v, plain)}
+    """Return the numbers and containers that an object of a library holds, and its parts."""
+    plain = np.ndarray, tuple, list, *PLAIN  # or a part: SciPy 1.18 keeps numbers in one
+    return {
+        k: v for k, v in attributes_of(value).items() if isinstance(v, plain) or _is_of_tables(v)
+    }
+
+
+def _is_of_tables(value: Any) -> bool:
+    return type(value).__module__.startswith(_TABLES)
 
 
 def attributes_of(thing: object) -> dict[str, Any]:

@@ -133,7 +133,7 @@ def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motio
             f"algebraic loop: put a state into the loop, or {_SMOOTH}"
         )
     slope = slope_of(graph, relay.leaf, motion.solutions)
-    gain = slope(rate) or graph.const(0.0)  # what is called as it stands has none: refused
+    gain = slope(rate) or graph.const(0.0)  # what is called unchanged has none: refused
     acts = gain.op != "const" or gain.data != 0.0
     beyond = None if acts else _second(graph, relay, rate, motion, slope)
     if beyond is not None:
@@ -180,7 +180,7 @@ def _check_input(who: str, relay: SlidingInput, motion: Motion) -> None:
     parts = needed([relay.given])
     for call in (e for e in parts if e.op == "call"):
         raise CompileError(
-            f"the input of {who} has no rate: {call.data[0]} is called as it stands, and has no "
+            f"the input of {who} has no rate: {call.data[0]} is called unchanged, and has no "
             f"derivative; {_SMOOTH}"
         )
     if _reads(relay.given, OUTPUTS):

@@ -449,8 +449,8 @@ def test_a_source_that_was_edited_since_is_not_believed(tmp_path):
 def test_a_function_without_source_is_refused():
     """What cannot be read may do anything."""
     names = {}
-    exec("def law(t, x, u, params):\n    return -x", names)
-    assert not linecache.getlines("<string>")
+    exec(compile("def law(t, x, u, params):\n    return -x", "<nowhere>", "exec"), names)
+    assert not linecache.getlines("<nowhere>")
     system = ct.nlsys(names["law"], None, inputs=0, outputs=1, states=1, name="hidden")
     with pytest.raises(CompileError, match=r"block 'hidden' cannot be compiled.*cannot be found"):
         nlctl.compile(system)
