@@ -449,17 +449,24 @@ class Driver:
             if not closes:
                 self._record(until, self.jumps.committed(until, state(until)))
             return
-        side = bisect.bisect_left if closes else bisect.bisect_right
-        for t in self.wanted[len(self.rows) : side(self.wanted, until)].tolist():
+        passed = bisect.bisect_right(self.wanted, min(until, self._last) if closes else until)
+        if closes:
+            passed = min(passed, bisect.bisect_left(self.wanted, until))
+        for t in self.wanted[len(self.rows) : passed].tolist():
             self._record(t, self.jumps.committed(t, state(t)))
 
     def _record(self, t: float, x: np.ndarray, ends: bool = False) -> None:
-        """Record outputs and states, if they are wanted at this time or the run ends there."""
-        done = len(self.rows)
-        wanted = self.wanted is None or (done < self.wanted.size and self.wanted[done] == t)
-        if wanted or ends:
+        """Record outputs and states, if they are wanted at this time or the run ends there.
+
+        Also for times right before it, at which rounding decides whether something has switched.
+        """
+        times = [t]
+        if self.wanted is not None:
+            times = self.wanted[len(self.rows) : bisect.bisect_right(self.wanted, t)].tolist()
+        times = times or [t] * ends
+        if times:
             y = outputs_now(self.system, t, x, self.inputs(t)) if self.system.noutputs else []
-            self.rows.append((t, np.asarray(y, dtype=float), x.copy()))
+            self.rows += [(s, np.asarray(y, dtype=float), x.copy()) for s in times]
 
     def _keep(self, span: tuple[float, float], pieces: list[Any], event: Event | None) -> None:
         """Keep what has arrived at transport delays between the last two stops.
