@@ -27,7 +27,7 @@ import numpy as np
 
 from ...annotations import unreported
 from ...expressions.source import codes_in
-from ..purity.captured import attributes_of, in_cell
+from ..purity.captured import held_attributes, in_cell
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
 
@@ -285,7 +285,7 @@ def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
     if not seen.add(thing):
         return
     yield from _of_class(type(thing), seen)
-    for name, value in sorted(attributes_of(thing).items()):
+    for name, value in sorted(held_attributes(thing).items()):
         if not (seen.deep and name in LAID_OUT):
             yield name
             yield from _fingerprint(value, seen)

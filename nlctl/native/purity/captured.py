@@ -162,7 +162,7 @@ def _content(value: Any) -> dict[str, Any]:
     """Return the numbers and containers that an object of a library holds, and its parts."""
     plain = np.ndarray, tuple, list, *PLAIN  # or a part: SciPy 1.18 keeps numbers in one
     return {
-        k: v for k, v in attributes_of(value).items() if isinstance(v, plain) or _is_of_tables(v)
+        k: v for k, v in held_attributes(value).items() if isinstance(v, plain) or _is_of_tables(v)
     }
 
 
@@ -170,7 +170,7 @@ def _is_of_tables(value: Any) -> bool:
     return type(value).__module__.startswith(_TABLES)
 
 
-def attributes_of(thing: object) -> dict[str, Any]:
+def held_attributes(thing: object) -> dict[str, Any]:
     """Return the attributes that an object has itself, those in slots among them."""
     held = {name: getattr(thing, name) for name in _slots(type(thing)) if hasattr(thing, name)}
     return {**held, **getattr(thing, "__dict__", {})}

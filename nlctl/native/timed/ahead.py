@@ -12,7 +12,7 @@ from ...expressions.dependence import rows_read
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
 from ..equations.located import Conditions
-from .breaks import break_points, in_order
+from .breaks import break_points, united
 from .straight import line_switches
 
 _KEPT = 256  # parameter vectors
@@ -88,7 +88,7 @@ def _with_more(one: Ahead, until: np.ndarray, behind: np.ndarray) -> Ahead:
     """Return what is known of a member with more switches, those that are finite."""
     switches = np.isfinite(behind)
     sides = (one.until, until[switches]), (one.breaks, behind[switches])
-    before, after = in_order(*map(np.concatenate, sides))
+    before, after = united(*map(np.concatenate, sides))
     return replace(one, until=before, breaks=after)
 
 

@@ -72,10 +72,10 @@ def break_points(
                 sides = _beyond_rounding(indicator, nudged, sides, span)
             until.append(sides[0])
             jumps.append(np.minimum(sides[1], span[1]))
-    return in_order(np.concatenate(until), np.concatenate(jumps))
+    return united(np.concatenate(until), np.concatenate(jumps))
 
 
-def in_order(before: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def united(before: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return switches in the order of time; those that overlap are one."""
     order = np.argsort(behind, kind="stable")
     behind = behind[order]
