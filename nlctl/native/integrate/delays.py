@@ -23,7 +23,7 @@ import numpy as np
 from ..machine.address import call_out
 from .control import rejected
 from .delayed import DEGREE, arrival, next_arrival, past_value, piece_at, sent
-from .evaluate import inputs_at
+from .evaluate import inputs_at, on_this_side
 from .methods import explicit
 from .state import INNER, RUNNING
 
@@ -98,18 +98,24 @@ def look_within(task, lanes, w):
             w.t[j] = lanes[j].t + POINTS[s] * lanes[j].step
             past.missed[j], past.missed_at_end[j] = 0.0, 0.0
             explicit.interpolate(POINTS[s], lanes[j].step, w.x, w.k, task.pair.B, j, w.x_stage)
-        inputs_at(task, lanes, w)
-        call_out(task.lines.signals[0], w.t, w.x_stage, w.u, task.p, past.seen[s])
+        _see_signals(task, lanes, w, w.x_stage, past.seen[s])
     for j in range(lanes.size):
         w.t[j] = lanes[j].t
-    inputs_at(task, lanes, w)
-    call_out(task.lines.signals[0], w.t, w.x, w.u, task.p, past.seen[DEGREE + 1])
+    _see_signals(task, lanes, w, w.x, past.seen[DEGREE + 1])
     for j in range(lanes.size):
         w.t[j] = lanes[j].t + lanes[j].step
-    inputs_at(task, lanes, w)
-    call_out(task.lines.signals[0], w.t, w.x_new, w.u, task.p, past.seen[DEGREE + 2])
+    _see_signals(task, lanes, w, w.x_new, past.seen[DEGREE + 2])
     for j in range(lanes.size):
         _fit(task, w, j)
+
+
+@numba.njit(**INNER)
+def _see_signals(task, lanes, w, x, seen):
+    """Fill what arrives at the lines at the times w.t, on this side of switches of t."""
+    if task.timed.jumps.shape[1]:
+        on_this_side(lanes, w)
+    inputs_at(task, lanes, w)
+    call_out(task.lines.signals[0], w.t, x, w.u, task.p, seen)
 
 
 @numba.njit(**INNER)
@@ -175,7 +181,7 @@ def keep(task, lanes, w, done, passed):
         broke = 0 if passed[j] or w.past.missed[j] < 0.0 else SMOOTH
         if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
             broke = min(broke, 1)
-        if is_due(task, lanes[j], j):
+        if is_due(task, lanes[j], j) or lanes[j].t >= lanes[j].left:  # a clock, or a switch of t
             broke = 0
         for i in range(task.lines.delays.shape[0]):
             w.past.fresh[i, j] = broke

@@ -69,6 +69,7 @@ _FIELDS = [
     ("untried", "i8"),  # of the first lane: steps that a window has left, for want of room
     ("turns", "i8"),  # steps that ended where a memory turns or jumps, and nothing else happens
     ("jump", "i8"),  # which of their break points comes next
+    ("nearly", "i8"),  # whether the attempt ends nearly where that is, by the last two attempts
     ("traces", "i8"),  # whether what is being located is a condition
     ("returns", "i8"),  # whether that was found in a step that ends behind a break point
     ("rests", "i8"),  # whether no state has moved by more than its tolerance in the last step

@@ -22,6 +22,7 @@ SMALL_KINK = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
+CONFIRMED = 3.0  # times as far as a line from the start says that a root lies
 SHORT = 1e-3  # part of a step: a shorter one between events is no progress
 PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
 
@@ -96,14 +97,15 @@ def locate(lane, task, w, j):
     # behind a break point stages are wrong by the rest; what a memory misses is quadratic in it
     behind = behind_turn(task.rtol) if memory else behind_event(task.rtol)
     tolerance = lane.high * behind
-    is_behind = lane.high == lane.step
-    if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):
+    is_behind, is_close = lane.high == lane.step, lane.high - root <= tolerance
+    if is_behind and ((is_close and lane.nearly) or lane.tries > TRIES):
         return EVENT
     if lane.high - lane.low <= tolerance:
         lane.step = lane.high
         lane.tries = TRIES
     else:
-        aim = root + 0.5 * tolerance
+        before = root - tolerance  # whether it is: what lies there says so
+        aim = before if is_close and is_behind and before > lane.low else root + 0.5 * tolerance
         width = lane.high - lane.low
         if lane.tries > 4 and lane.tries % 2:
             aim = lane.low + 0.5 * width
@@ -117,6 +119,7 @@ def _narrowed(lane, task, w, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     # And whether it is a memory's.
     events, memories, before, weight, inside = w.events, w.memories, lane.high, 1.0, True
+    lane.nearly = 0
     if lane.tries == 0:
         lane.low, lane.high, lane.same_side = 0.0, lane.step, 0
         _bracketed(events.g_low, events.g_high, events.g_start, events.g, j)
@@ -130,6 +133,11 @@ def _narrowed(lane, task, w, j):
             lane.same_side = min(lane.same_side, 0) - 1
         else:
             lane.same_side = max(lane.same_side, 0) + 1
+            lane.nearly = 1
+            _confirm(lane, task.rtol, before, events.g_start, events.g_high, events.g, j)
+            _confirm(
+                lane, task.rtol, before, memories.rate_start, memories.rate_high, memories.rate, j
+            )
         weight = 0.5 if abs(lane.same_side) > 1 else 1.0  # Illinois: an end that stays loses some
         _nearer(inside, weight, events.g_low, events.g_high, events.g, j)
         _nearer(inside, weight, memories.rate_low, memories.rate_high, memories.rate, j)
@@ -137,6 +145,22 @@ def _narrowed(lane, task, w, j):
     turn = first_turn(lane, w, memories.rate_low, memories.rate_high, j)
     is_memory = turn >= 0.0 and not 0.0 <= root <= turn
     return (turn if is_memory else root), is_memory
+
+
+@numba.njit(**INNER)
+def _confirm(lane, rtol, before, start, high, end, j):
+    """Forget that an attempt ends nearly at a root, if the last two do not lead to it."""
+    # Next to the crest of a narrow pulse they are small beside what they were at the start, and 0
+    # is far: a line from there says nothing.
+    farther = before - lane.step
+    for i in range(end.shape[0]):
+        if not opposite(start[i, j], end[i, j]) or farther <= 0.0:
+            continue
+        distance = end[i, j] * farther / (high[i, j] - end[i, j])
+        part = end[i, j] / (end[i, j] - start[i, j])
+        is_close = part <= behind_turn(rtol)
+        if is_close and not 0.0 <= distance <= CONFIRMED * (part + behind_event(rtol)) * lane.step:
+            lane.nearly = 0
 
 
 @numba.njit(**INNER)
