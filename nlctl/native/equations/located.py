@@ -318,10 +318,15 @@ def _pulses(graph: Graph, term: Expr, timed: set[Expr]) -> list[Expr]:
 
     In a train of pulses that a wave modulates, one may be low; as a factor it is as high as others.
     """
-    factors = term.args if term.op == "mul" else ()
-    alone = (arg for arg in factors if arg in timed and arg.op != "leaf")
-    sought = (arg for arg in alone if _frequencies(graph, arg, timed) is None)
-    return [term, *(pulse for arg in sought for pulse in _pulses(graph, arg, timed))]
+    pulses, left = {term: None}, [term]
+    while left and len(pulses) < _MOST_FREQUENCIES:
+        node = left.pop()
+        factors = dict.fromkeys(node.args if node.op == "mul" else ())
+        alone = [f for f in factors if f in timed and f.op != "leaf" and f not in pulses]
+        sought = [factor for factor in alone if _frequencies(graph, factor, timed) is None]
+        pulses |= dict.fromkeys(sought)
+        left += sought
+    return list(pulses)
 
 
 def _frequencies(graph: Graph, term: Expr, timed: set[Expr]) -> tuple[Expr, ...] | None:

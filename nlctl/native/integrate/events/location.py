@@ -119,7 +119,7 @@ def _narrowed(lane, task, w, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     # And whether it is a memory's.
     events, memories, before, weight, inside = w.events, w.memories, lane.high, 1.0, True
-    lane.nearly = 0
+    lane.nearly = 1 if task.taylor.highest else 0  # whose polynomials have been followed to there
     if lane.tries == 0:
         lane.low, lane.high, lane.same_side = 0.0, lane.step, 0
         _bracketed(events.g_low, events.g_high, events.g_start, events.g, j)
