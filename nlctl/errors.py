@@ -213,14 +213,14 @@ class InexactWarning(UserWarning):
     >>> import control as ct
     >>> import scipy.special
     >>> system = ct.nlsys(
-    ...     lambda t, x, u, params: [u[0] - scipy.special.j0(x[0])],
+    ...     lambda t, x, u, params: [u[0] - scipy.special.yv(0, x[0])],
     ...     None, states=1, inputs=1, outputs=1, name="plant",
     ... )
     >>> with warnings.catch_warnings(record=True) as caught:
     ...     warnings.simplefilter("always")
     ...     linear = nlctl.linearize(system, [1.0])
-    >>> print(caught[0].category.__name__, linear.A.round(6))  # J_0' = -J_1
-    InexactWarning [[0.440051]]
+    >>> print(caught[0].category.__name__, linear.A.round(6))  # Y_0' = -Y_1
+    InexactWarning [[0.781213]]
     """
 
 

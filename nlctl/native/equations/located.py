@@ -58,9 +58,9 @@ class Conditions:
     # first those that only bend, then those at which something may jump
     located: tuple[Located, ...] = ()
     of_time: tuple[Expr, ...] = ()  # conditions of t alone, which are solved before a run
-    # switching functions of t alone that blocks declare, by their rows: faults' beginnings and ends
+    # switching functions that blocks declare and that are straight lines of t, by their rows:
+    # faults' beginnings and ends
     declared_of_time: Mapping[int, Expr] = field(default_factory=dict)
-    straight: tuple[Expr, ...] = ()  # those that are straight lines
     # of products of sines of t the angular frequencies of the factors
     waves: tuple[tuple[Expr, ...], ...] = ()
     pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
@@ -136,33 +136,23 @@ def found_conditions(
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
         beyond += left
-    declared_of_time = _declared_of_time(declared, timed)
-    straight = tuple(filter(is_straight, declared_of_time.values()))
-    bent = (function for function in declared_of_time.values() if function not in straight)
-    of_time |= dict.fromkeys(_sides(reader.graph, bent))
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
-        located=ordered, of_time=tuple(of_time), declared_of_time=declared_of_time,
-        straight=straight, waves=waves, pulses=pulses, beyond=beyond, shown=count,
-        sharp=_sharp(reader, rates, inside - timed),
+        located=ordered, of_time=tuple(of_time),
+        declared_of_time=_declared_of_time(declared, timed), waves=waves, pulses=pulses,
+        beyond=beyond, shown=count, sharp=_sharp(reader, rates, inside - timed),
     )  # fmt: skip
 
 
 def _declared_of_time(declared: Sequence[Tracer], timed: set[Expr]) -> dict[int, Expr]:
-    """Return the declared switching functions that vary with t alone, by their rows."""
+    """Return the declared switching functions that are straight lines of t, by their rows."""
     functions, row = dict[int, Expr](), 0
     for expr, size in (piece for array in declared for piece in array.pieces()):
-        if expr in timed and size == 1:
+        if expr in timed and size == 1 and is_straight(expr):
             functions[row] = expr
         row += size
     return functions
-
-
-def _sides(graph: Graph, functions: Iterable[Expr]) -> list[Expr]:
-    """Return on which side of 0 functions are; where they are 0 a block may be on either."""
-    zero = graph.const(0.0)
-    return [graph.op(order, function, zero) for function in functions for order in ("lt", "le")]
 
 
 def _entered(

@@ -56,9 +56,9 @@ def ahead(
     count = p.shape[1]
     span = float(times[0]), float(times[-1])
     own = [_of(timed, p[:, j], span) for j in range(count)]
-    straight = timed.conditions.straight
-    if straight:
-        until, behind = line_switches(straight, p, span)
+    lines = [*timed.conditions.declared_of_time.values()]
+    if lines:
+        until, behind = line_switches(lines, p, span)
         own = [_with_more(one, until[:, j], behind[:, j]) for j, one in enumerate(own)]
     jumps = np.full((2, count, max(one.breaks.size for one in own)), np.inf)
     limits = np.full((count, max(one.reach.size for one in own)), np.inf)

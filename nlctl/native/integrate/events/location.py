@@ -22,6 +22,7 @@ SMALL_KINK = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
+FAR_SIDE = 0.9  # part of an attempt: the near side has not been looked at close to its end
 CONFIRMED = 3.0  # times as far as a line from the start says that a root lies
 SHORT = 1e-3  # part of a step: a shorter one between events is no progress
 PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
@@ -134,10 +135,8 @@ def _narrowed(lane, task, w, j):
         else:
             lane.same_side = max(lane.same_side, 0) + 1
             lane.nearly = 1
-            _confirm(lane, task.rtol, before, events.g_start, events.g_high, events.g, j)
-            _confirm(
-                lane, task.rtol, before, memories.rate_start, memories.rate_high, memories.rate, j
-            )
+            if not task.taylor.highest and lane.low < FAR_SIDE * lane.high:
+                _confirm(lane, task.rtol, before, w.events, j)
         weight = 0.5 if abs(lane.same_side) > 1 else 1.0  # Illinois: an end that stays loses some
         _nearer(inside, weight, events.g_low, events.g_high, events.g, j)
         _nearer(inside, weight, memories.rate_low, memories.rate_high, memories.rate, j)
@@ -148,18 +147,18 @@ def _narrowed(lane, task, w, j):
 
 
 @numba.njit(**INNER)
-def _confirm(lane, rtol, before, start, high, end, j):
+def _confirm(lane, rtol, before, events, j):
     """Forget that an attempt ends nearly at a root, if the last two do not lead to it."""
     # Next to the crest of a narrow pulse they are small beside what they were at the start, and 0
     # is far: a line from there says nothing.
     farther = before - lane.step
-    for i in range(end.shape[0]):
-        if not opposite(start[i, j], end[i, j]) or farther <= 0.0:
+    for i in range(events.g.shape[0]):
+        start, high, end = events.g_start[i, j], events.g_high[i, j], events.g[i, j]
+        if not opposite(start, end) or farther <= 0.0:
             continue
-        distance = end[i, j] * farther / (high[i, j] - end[i, j])
-        part = end[i, j] / (end[i, j] - start[i, j])
-        is_close = part <= behind_turn(rtol)
-        if is_close and not 0.0 <= distance <= CONFIRMED * (part + behind_event(rtol)) * lane.step:
+        distance, part = end * farther / (high - end), end / (end - start)
+        most = CONFIRMED * (part + behind_event(rtol)) * lane.step
+        if part <= behind_event(rtol) and not 0.0 <= distance <= most:
             lane.nearly = 0
 
 
