@@ -66,7 +66,13 @@ const engineOf = async (bytes, facts) => {
       }
       before = now;
     }
-    return [...found].sort((a, b) => a[0] - b[0]);
+    const united = [];  // those that meet, as of t < 1 and t <= 1, are one
+    for (const [behind, last] of [...found].sort((a, b) => a[0] - b[0])) {
+      const one = united.at(-1);
+      if (one && last <= one[0]) one[0] = behind;
+      else united.push([behind, last]);
+    }
+    return united;
   };
   const reached = () => {
     const limit = new Float64Array(facts.cells).fill(Infinity);

@@ -260,7 +260,7 @@ class _Reader:
     def _check_switches(self, name: str, place: int) -> None:
         """Refuse what moves switches of functions of time that come too close for a page."""
         timed = self.compiled.lowered.timed
-        if place not in set(timed.parameters.tolist()) or not timed.conditions.of_time:
+        if place not in set(timed.parameters.tolist()) or not timed.conditions.switches_of_time:
             return
         times = np.array(self.span)
         jumps = ahead(timed, self.p[:, None], times, np.inf)["jumps"][0]

@@ -179,7 +179,7 @@ def _laid_out(
     task, work = run.task, run.work
     conditions = run.machine.lowered.conditions
     timed = task.timed
-    if conditions.of_time:
+    if conditions.switches_of_time:
         room = np.full((2, 1, _BREAKS), np.inf)
         count = min(timed.jumps.shape[1], _BREAKS)
         room[:, :, :count] = timed.until[:, :count], timed.jumps[:, :count]

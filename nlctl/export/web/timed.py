@@ -42,17 +42,19 @@ def timed_program(equations: Equations, layout: Any) -> TimedProgram:
         stores.extend(split(Store(array="s", row=begin, expr=graph.number(expr), size=size)))
         return begin, begin + size
 
-    levels = max(
-        (stored(_level(graph, condition))[1] for condition in conditions.of_time), default=0
-    )
+    levels = [_level(graph, condition) for condition in conditions.of_time]
+    zero = graph.const(0.0)
+    for line in conditions.declared_of_time.values():  # at 0 a block may be on either side
+        levels += [graph.op(order, line, zero) for order in ("lt", "le")]
+    ends = [stored(level)[1] for level in levels]
     waves = tuple(tuple(stored(slope) for slope in wave) for wave in conditions.waves)
     pulses = tuple(stored(term) for term in conditions.pulses)
     values, exact, _ = rewritten(graph, {"timed": stores})
     functions, rows = planned(values, {"timed": SAMPLE}, length(layout))
     named = {"timed.prepare": functions["prepare"], "timed": functions["timed"]}
     return TimedProgram(
-        text=program_text(named, 1, exact), rows=max(rows, 1), levels=levels, waves=waves,
-        pulses=pulses, size=max(sum(store.size for store in stores), 1),
+        text=program_text(named, 1, exact), rows=max(rows, 1), levels=max(ends, default=0),
+        waves=waves, pulses=pulses, size=max(sum(store.size for store in stores), 1),
     )  # fmt: skip
 
 

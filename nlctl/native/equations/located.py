@@ -70,6 +70,11 @@ class Conditions:
     sharp: tuple[SharpArgument, ...] = ()
 
     @property
+    def switches_of_time(self) -> bool:
+        """Whether anything of t alone switches, as far as that is solved before a run."""
+        return bool(self.of_time or self.declared_of_time)
+
+    @property
     def rows(self) -> int:
         """Numbers that the switching functions are."""
         return sum(condition.rows for condition in self.located)

@@ -43,7 +43,8 @@ class OfTime:
         """Places of the parameters that they depend on."""
         found, places = self.conditions, set[int]()
         waves = (slope for wave in found.waves for slope in wave)
-        for node in needed([*found.of_time, *found.pulses, *waves]):
+        switches = (*found.of_time, *found.declared_of_time.values())
+        for node in needed([*switches, *found.pulses, *waves]):
             if node.op == "leaf" and node.data[0] == "p":
                 places.update(rows_read(node))
         return np.array(sorted(places), dtype=np.int64)

@@ -76,11 +76,11 @@ def break_points(
 
 
 def united(before: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return switches in the order of time; those that overlap are one."""
+    """Return switches in the order of time; those that meet or overlap are one."""
     order = np.argsort(behind, kind="stable")
     behind = behind[order]
     before = np.minimum.accumulate(before[order][::-1])[::-1]
-    begins = np.append(True, before[1:] >= behind[:-1])[: before.size]
+    begins = np.append(True, before[1:] > behind[:-1])[: before.size]
     return before[begins], behind[np.append(begins[1:], True)[: behind.size]]
 
 
