@@ -389,6 +389,9 @@ class Graph:
             is_reversed = this is b and name in ("div", "sub") and len(args) == 2
             if is_number and not is_reversed and neutral is not None and other.data == neutral:
                 return this
+        if name == "copysign" and is_const[-1] and b.data == b.data:
+            size = self.op("absolute", a)
+            return size if np.copysign(1.0, b.data) > 0.0 else self.op("neg", size)
         if name == "sub" and is_const[0] and a.data == 0.0:
             return self.op("neg", b)
         return a.args[0] if name == "neg" and a.op == "neg" else None
