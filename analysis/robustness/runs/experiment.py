@@ -22,6 +22,7 @@ from nlctl.native import compile as compiled
 from nlctl.native.settings import Settings
 from nlctl.params import as_numbers, checked_times
 from nlctl.responses.arguments import input_array
+from nlctl.responses.breaks import with_breaks
 
 from ...metrics import Metric, in_machine_code
 from ..stl.piecewise import with_vertices
@@ -318,7 +319,8 @@ def compile_experiment_ahead(prepared: Prepared) -> None:
     with_vertices(time, np.zeros(time.size))
     for metric in prepared.experiment.metrics:
         if isinstance(metric, Metric):
-            _fast(metric).function(time, *np.zeros((len(metric.signals), time.size)))
+            function = with_breaks(_fast(metric).function, np.zeros(0))
+            function(time, *np.zeros((len(metric.signals), time.size)))
 
 
 def _fast(metric: Metric) -> Metric:
