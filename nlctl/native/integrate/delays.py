@@ -170,7 +170,7 @@ def keep(task, lanes, w, done, passed):
     """Keep the signals of the accepted steps, and let arrive what arrives at their ends."""
     # ``passed`` becomes where derivatives are to be evaluated anew: at a jump that arrives, and at
     # events if there are memories. Return whether a jump arrives in any lane. A step across a jump
-    # is no piece of the past: the next one begins where it has begun.
+    # is not a piece of the past: the next one begins where it has begun.
     jumped = False
     for j in range(lanes.size):
         w.past.bends[j] = 0
