@@ -220,7 +220,7 @@ class InexactWarning(UserWarning):
     ...     warnings.simplefilter("always")
     ...     linear = nlctl.linearize(system, [1.0])
     >>> print(caught[0].category.__name__, linear.A.round(6))  # Y_0' = -Y_1
-    InexactWarning [[0.781213]]
+    InexactWarning [[-0.781213]]
     """
 
 
