@@ -82,6 +82,11 @@ FUNCTIONS = {
     "choose": lambda x: np.choose((x[0] > 0).astype(int), [x[1], 2 * x[2]]),
     "nanargmax": lambda x: np.nanargmax(np.where(x == max(x), np.nan, x)),
     "a mean where": lambda x: np.mean(x, where=x > -9),
+    "a mean of columns": lambda x: np.mean(regular(x), where=np.array([True, False, True])),
+    "a mean of rows": lambda x: np.mean(
+        np.outer(x, [1.0, 2.0]), axis=0, where=(np.arange(x.size) > 0)[:, None]
+    )[1],
+    "a mean where it is so for all": lambda x: np.mean(x, where=x[0] > -9),
     "uneven gradient": lambda x: np.gradient(x, [0.0, 0.1, 0.3, 0.4])[1],
     "windows": lambda x: np.lib.stride_tricks.sliding_window_view(x, 2).mean(axis=1)[1],
     "fabs": lambda x: np.fabs(x).sum(),

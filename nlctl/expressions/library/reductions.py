@@ -137,8 +137,8 @@ def mean(
 ) -> Any:  # fmt: skip
     """Return a mean."""
     if where is not True:
-        chosen = elementwise(graph, "select", where, 1.0, elementwise(graph, "mul", values, 0.0))
-        chosen = elementwise(graph, "ne", where, 0.0) if traced(graph, where).shape else chosen
+        nothing = np.zeros(traced(graph, values).shape)  # a mask of another shape counts for all
+        chosen = elementwise(graph, "select", where, 1.0, nothing)
         parts = sum_along(graph, values, axis, keepdims=keepdims, where=where)
         return elementwise(graph, "div", parts, sum_along(graph, chosen, axis, keepdims=keepdims))
     if isinstance(values, Masked):
