@@ -1,8 +1,8 @@
-"""Which results depend on which entries of an array: the structure of a Jacobian matrix."""
+"""Which results depend on what, and how: the structure of a Jacobian matrix, what is affine."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from .graph import LINEAR, OF_FACTORS, Expr, needed
 
 # each element of the result depends on all that goes in
 _WHOLE = ("sum", "call", "solve", *LINEAR, *OF_FACTORS)
+_AFFINE = ("add", "sub", "neg", "sum", "item", "slice", "concat")  # in what they are made of
 
 
 def rows_read(leaf: Expr) -> list[int]:
@@ -55,13 +56,26 @@ def _of_node(node: Expr, parts: list[np.ndarray], array: str, count: int) -> np.
     return nothing
 
 
-def is_straight(function: Expr) -> bool:
-    """Whether a function of t alone is a straight line, whatever the parameters are."""
-    straight: set[Expr] = set()
-    for node in needed([function]):
-        varying = [arg for arg in node.args if arg.varies]
-        is_multiple = node.op == "mul" or (node.op == "div" and not node.args[1].varies)
-        is_line = node.op in ("add", "sub", "neg") or (is_multiple and len(varying) == 1)
-        if node.op == "leaf" or (is_line and straight.issuperset(varying)):
-            straight.add(node)
-    return function in straight
+def affine(expr: Expr, leaf: Expr) -> bool:
+    """Whether an expression is a + b v for all values, as it is written."""
+    for node, by in dependent_nodes(expr, leaf):
+        linear = (
+            node.op in _AFFINE
+            or (node.op == "mul" and sum(by) == 1)
+            or (node.op == "div" and not by[1])
+            or (node.op == "lu_solve" and not by[0])
+            or (node.op == "select" and not by[0])
+        )
+        if not linear:
+            return False
+    return True
+
+
+def dependent_nodes(expr: Expr, leaf: Expr) -> Iterator[tuple[Expr, list[bool]]]:
+    """Yield what depends on a leaf, inner parts first, and by which arguments it does."""
+    depends = {leaf}
+    for node in needed([expr]):
+        by = [arg in depends for arg in node.args]
+        if any(by):
+            depends.add(node)
+            yield node, by

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -40,17 +41,16 @@ def known_conditions(
     found = {k: v[0] for k, v in ahead(lowered.timed, p[:, None], times, np.inf).items()}
     stops = np.stack([found["until"], found["jumps"]])[:, np.isfinite(found["jumps"])]
     located = lowered.conditions.rows - len(watched)  # these the run watches itself
-    switched = _switched(compiled, p)
+    known = Known(
+        stops=stops, switched=_switched(compiled, p), longest=_longest(found, times),
+        followed=followed(compiled, p),
+    )  # fmt: skip
     if not located:
-        return Known(
-            stops=stops, switched=switched, longest=_longest(found, times),
-            followed=followed(compiled, p),
-        )  # fmt: skip
+        return known
     first = compiled.program.switching
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
-    return Known(
-        stops=stops, switched=switched, longest=_longest(found, times), labels=tuple(labels),
-        partners=tuple(lowered.conditions.partners[:located]), followed=followed(compiled, p),
+    return replace(
+        known, labels=tuple(labels), partners=tuple(lowered.conditions.partners[:located]),
         crossings=_crossings(compiled, p, slice(first, first + located)),
     )  # fmt: skip
 

@@ -449,9 +449,8 @@ class Driver:
             if not closes:
                 self._record(until, self.jumps.committed(until, state(until)))
             return
-        passed = bisect.bisect_right(self.wanted, min(until, self._last) if closes else until)
-        if closes:
-            passed = min(passed, bisect.bisect_left(self.wanted, until))
+        last = min(float(np.nextafter(until, -np.inf)), self._last) if closes else until
+        passed = bisect.bisect_right(self.wanted, last)
         for t in self.wanted[len(self.rows) : passed].tolist():
             self._record(t, self.jumps.committed(t, state(t)))
 

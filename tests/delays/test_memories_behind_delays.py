@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from dense_play import through_play
 
 import nlctl
 
@@ -58,14 +59,6 @@ def jumping_sine(w):
     return np.sin(3.0 * w) + (1.0 if np.sin(w) > 0.5 else 0.0)
 
 
-def through_play(u):
-    """What a play makes of samples of a signal."""
-    v = np.zeros_like(u)
-    for i in range(1, u.size):
-        v[i] = min(max(v[i - 1], u[i] - R), u[i] + R)
-    return v
-
-
 @pytest.mark.parametrize("delays", [(LATE,), (0.5, LATE - 0.5)], ids=["one", "two"])
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_every_jump_of_a_saw_arrives_at_a_stop(rtol, delays):
@@ -86,7 +79,7 @@ def test_a_play_behind_a_delay_is_that_of_the_late_signal(signal, rtol):
     timepts = np.append(0.0, np.linspace(0.61, 11.83, 23))
     dense = np.linspace(0.0, 12.0, 240_001)
     late = np.array([signal(w - LATE) if w >= LATE else 0.0 for w in dense])
-    exact = np.interp(timepts, dense, through_play(late))
+    exact = np.interp(timepts, dense, through_play(late, R))
     run = nlctl.input_output_response(compiled, timepts, rtol=rtol, atol=rtol / 100)
     assert run.outputs[0] == pytest.approx(exact, abs=1e-4 + 30 * rtol)
 

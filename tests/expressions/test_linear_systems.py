@@ -12,13 +12,13 @@ import nlctl
 from nlctl.errors import ParameterError
 from nlctl.export import c_files, export_equations
 from nlctl.expressions.arrays import leaf_vector
+from nlctl.expressions.dependence import affine
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Graph, needed
 from nlctl.expressions.jacobian_source import jacobian_function
 from nlctl.expressions.trace import trace
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
-from nlctl.native.sliding.pieces import affine
 
 ROWS = (7, 8, 9, 13, 20)
 

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from dense_play import through_play
 
 import nlctl
 
@@ -25,14 +26,6 @@ def loop(onset, until, kind="gain", value=GAIN, **more):
     return nlctl.with_faults(diagram, fault)
 
 
-def through_play(t, u):
-    """What a play makes of samples of a signal, the last of them at each time."""
-    v = np.zeros_like(u)
-    for i in range(1, u.size):
-        v[i] = min(max(v[i - 1], u[i] - R), u[i] + R)
-    return v
-
-
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
 @pytest.mark.parametrize(
     "choice", [*({"method": m} for m in ("tsit5", "rodas5p", "taylor", "auto"))], ids=str
@@ -46,7 +39,7 @@ def test_a_play_that_is_carried_when_a_fault_begins_keeps_what_it_was(onset, cho
     dense = np.union1d(np.linspace(0.0, 5.0, 500_001), [*timepts, *before])
     wave = np.sin(2.0 * dense)
     faulty = (dense >= onset) & (dense < until)
-    exact = through_play(dense, np.where(faulty, GAIN * wave, wave))
+    exact = through_play(np.where(faulty, GAIN * wave, wave), R)
     run = nlctl.input_output_response(
         loop(onset, until), timepts, 0, [0.0, 1.0, 0.0, 0.0], rtol=rtol, atol=rtol / 100, **choice
     )

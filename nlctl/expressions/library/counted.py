@@ -13,16 +13,9 @@ from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import bits, elementwise, integer_range, mapped_cells, moved_bits
 from .shapes import by_moving
-from .table import Facade, constant_value, formula, of
+from .table import Facade, formula, known_numbers, of
 
 __all__: list[str] = []
-
-
-def _numbers(graph: Graph, value: object, what: str) -> np.ndarray:
-    constant = constant_value(traced(graph, value))
-    if isinstance(constant, Tracer):
-        raise Untraceable(f"{what} that depend on the state or on parameters")
-    return np.asarray(constant)
 
 
 @of(np.histogram)
@@ -34,7 +27,7 @@ def histogram(
     values = traced(graph, a).short().reshape(-1)
     if isinstance(bins, int) and range is None:
         raise Untraceable("a histogram whose edges depend on the state")
-    given = bins if isinstance(bins, int | str) else _numbers(graph, bins, "edges of bins")
+    given = bins if isinstance(bins, int | str) else known_numbers(bins, "edges of bins")
     edges = np.histogram_bin_edges(np.zeros(0), given, range)
     beyond = [elementwise(graph, "ge", values, float(edge)) for edge in edges[:-1]]
     inside = [elementwise(graph, "lt", values, float(edge)) for edge in edges[1:-1]]

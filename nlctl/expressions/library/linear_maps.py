@@ -10,8 +10,7 @@ import numpy as np
 
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
-from .scattered import known_numbers
-from .table import enter
+from .table import enter, known_numbers
 
 __all__: list[str] = []
 

@@ -17,22 +17,12 @@ from ..arrays import Tracer, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
 from .reductions import argmin
-from .table import Facade, constant_value
+from .table import Facade, known_numbers
 
 __all__: list[str] = []
 
 _MOST = 256  # triangles or points
 _INSIDE = -100 * float(np.finfo(float).eps)
-
-
-def known_numbers(value: object, what: str) -> np.ndarray:
-    """Return numbers that do not depend on the state."""
-    known = constant_value(value) if isinstance(value, Tracer) else value
-    if isinstance(known, list | tuple):
-        known = [known_numbers(v, what) for v in known]
-    if isinstance(known, Tracer):
-        raise Untraceable(f"{what} that depend on the state or on parameters")
-    return np.asarray(known)
 
 
 def _coordinates(graph: Graph, given: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...]]:

@@ -94,6 +94,16 @@ def constant_value(value: Tracer) -> Any:
     return np.array([as_number(e.data) for e in value.elements().flat]).reshape(value.shape)
 
 
+def known_numbers(value: object, what: str) -> np.ndarray:
+    """Return numbers that do not depend on the state."""
+    known = constant_value(value) if isinstance(value, Tracer) else value
+    if isinstance(known, list | tuple):
+        known = [known_numbers(v, what) for v in known]
+    if isinstance(known, Tracer):
+        raise Untraceable(f"{what} that depend on the state or on parameters")
+    return np.asarray(known)
+
+
 class Facade:
     """What formulas find as NumPy: its functions, of arrays of expressions."""
 

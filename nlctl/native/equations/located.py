@@ -12,7 +12,7 @@ from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
-from ...expressions.dependence import is_straight, reads
+from ...expressions.dependence import affine, reads
 from ...expressions.derivatives import tangents
 from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
@@ -145,16 +145,18 @@ def found_conditions(
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time),
-        declared_of_time=_declared_of_time(declared, timed), waves=waves, pulses=pulses,
-        beyond=beyond, shown=count, sharp=_sharp(reader, rates, inside - timed),
+        declared_of_time=_declared_of_time(reader.graph, declared, timed), waves=waves,
+        pulses=pulses, beyond=beyond, shown=count, sharp=_sharp(reader, rates, inside - timed),
     )  # fmt: skip
 
 
-def _declared_of_time(declared: Sequence[Tracer], timed: set[Expr]) -> dict[int, Expr]:
+def _declared_of_time(
+    graph: Graph, declared: Sequence[Tracer], timed: set[Expr]
+) -> dict[int, Expr]:
     """Return the declared switching functions that are straight lines of t, by their rows."""
-    functions, row = dict[int, Expr](), 0
+    functions, row, t = dict[int, Expr](), 0, graph.leaf("t", 0, None)
     for expr, size in (piece for array in declared for piece in array.pieces()):
-        if expr in timed and size == 1 and is_straight(expr):
+        if expr in timed and size == 1 and affine(expr, t):
             functions[row] = expr
         row += size
     return functions

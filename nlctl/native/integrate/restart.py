@@ -89,15 +89,10 @@ def restart(rhs, task, lanes, w, chosen):
             if not _commit(task, w, chosen):
                 break
             _refresh(rhs, task, lanes, w, chosen)
-        saved = memories.rate.copy()
         for j in range(lanes.size):
-            w.ahead.begin[j] = lanes[j].t
             for i in range(memories.m.shape[0]):
                 memories.rate_start[i, j] = 0.0 if chosen[j] else memories.rate_start[i, j]
-        memory_rates(rhs, task, lanes, w, w.x, w.k[0])
-        for i in range(memories.m.shape[0]):
-            for j in range(lanes.size):
-                memories.rate[i, j] = memories.rate[i, j] if chosen[j] else saved[i, j]
+        _rates_now(rhs, task, lanes, w, chosen)
         _lock(rhs, task, lanes, w, chosen)
     for j in range(lanes.size):
         if chosen[j]:
@@ -105,23 +100,31 @@ def restart(rhs, task, lanes, w, chosen):
 
 
 @numba.njit(**INNER)
+def _rates_now(rhs, task, lanes, w, chosen):
+    """Make the chosen lanes' rates of memories those of their state; the others' stay."""
+    rates = w.memories.rate
+    saved = rates.copy()
+    for j in range(lanes.size):
+        w.ahead.begin[j] = lanes[j].t
+    memory_rates(rhs, task, lanes, w, w.x, w.k[0])
+    for i in range(rates.shape[0]):
+        for j in range(lanes.size):
+            rates[i, j] = rates[i, j] if chosen[j] else saved[i, j]
+
+
+@numba.njit(**INNER)
 def continue_behind_kinks(rhs, task, lanes, w, passed):
     """Let memories move on where a kink arrives, or resume there: add these lanes to `passed`."""
     # A memory that is carried further in the same direction, or stands still as before, needs no
     # more than its rate behind the kink. Return whether any lane is to resume.
-    memories, again = w.memories, False
-    saved = memories.rate.copy()
+    memories, again, bent = w.memories, False, np.zeros(lanes.size, np.bool_)
     for j in range(lanes.size):
-        w.ahead.begin[j] = lanes[j].t
-    memory_rates(rhs, task, lanes, w, w.x, w.k[0])
+        bent[j] = w.past.bends[j] != 0 and not passed[j]
+    _rates_now(rhs, task, lanes, w, bent)
     for j in range(lanes.size):
-        for i in range(memories.rate.shape[0]):
-            bent, rate = memories.rate[i, j], memories.rate_start[i, j]
-            memories.rate[i, j] = saved[i, j]
-            if not w.past.bends[j] or passed[j]:
-                continue
-            if np.sign(bent) == np.sign(rate):
-                memories.rate_start[i, j] = bent
+        for i in range(memories.rate.shape[0] if bent[j] else 0):
+            if np.sign(memories.rate[i, j]) == np.sign(memories.rate_start[i, j]):
+                memories.rate_start[i, j] = memories.rate[i, j]
             else:
                 passed[j] = again = True
     return again

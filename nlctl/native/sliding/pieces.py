@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ...expressions.bends import replaced_parts
+from ...expressions.dependence import affine, dependent_nodes
 from ...expressions.derivatives import tangents
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
-_LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")
 _BENDS = ("maximum", "minimum", "absolute", "select")
 _ORDERS = ("lt", "le", "gt", "ge")
 _POSITIVE = ("exp", "absolute", "sqrt", "cosh")
@@ -28,31 +28,6 @@ _POINTS = 16  # values for which a choice is seen not to jump
 _EQUAL = 1e-9
 
 LeafDerivative = Callable[[Expr], Expr | None]
-
-
-def affine(expr: Expr, leaf: Expr) -> bool:
-    """Whether an expression is a + b v for all values, as it is written."""
-    for node, by in _dependent(expr, leaf):
-        linear = (
-            node.op in _LINEAR
-            or (node.op == "mul" and sum(by) == 1)
-            or (node.op == "div" and not by[1])
-            or (node.op == "lu_solve" and not by[0])
-            or (node.op == "select" and not by[0])
-        )
-        if not linear:
-            return False
-    return True
-
-
-def _dependent(expr: Expr, leaf: Expr) -> Iterator[tuple[Expr, list[bool]]]:
-    """Yield what depends on a leaf, inner parts first, and by which arguments it does."""
-    depends = {leaf}
-    for node in needed([expr]):
-        by = [arg in depends for arg in node.args]
-        if any(by):
-            depends.add(node)
-            yield node, by
 
 
 def unreadable(graph: Graph, rate: Expr, leaf: Expr, tangent: LeafDerivative) -> str:
@@ -117,7 +92,7 @@ def _bends(expr: Expr, leaf: Expr) -> list[Expr]:
     """Return the parts at which an expression may bend as the leaf changes, inner ones first."""
     return [
         node
-        for node, by in _dependent(expr, leaf)
+        for node, by in dependent_nodes(expr, leaf)
         if node.op in _BENDS and (node.op != "select" or by[0])
     ]
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 from ...errors import CompileError
 from ...expressions.bends import replaced_parts
+from ...expressions.dependence import affine
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
-from .pieces import LeafDerivative, affine, bend_places, slope_of, unreadable, zero_between
+from .pieces import LeafDerivative, bend_places, slope_of, unreadable, zero_between
 from .second import Limits, second_order
 
 OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs

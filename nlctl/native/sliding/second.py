@@ -17,9 +17,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...expressions.bends import replaced_parts
+from ...expressions.dependence import affine
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
-from .pieces import LeafDerivative, affine, bend_places, unreadable, zero_between
+from .pieces import LeafDerivative, bend_places, unreadable, zero_between
 
 
 @dataclass(frozen=True, kw_only=True)
