@@ -286,17 +286,17 @@ class Compiled(Reading, StandIn):
             As `linearize`, if there is no such parameter, and if numbers follow from it outside of
             the equations, by a record's `derived`.
         """
-        places = jacobians.float_parameters(self)
+        reading = jacobians.with_floats(self, parameters)
+        places = jacobians.float_parameters(reading)
         jacobians.tell_of_differences(self, self.parameter_vector(params))  # blocks have these
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))
         for k, name in enumerate(parameters):
             if name not in places:
                 raise unknown("parameter", name, places, f"of '{self.system.name}' that is a float")
-            place, owner = places[name]
-            jacobians.check_enters_alone(owner, name)
-            directions[start + place, k] = 1.0
-        found = jacobians.jacobian(self, x0, u0, t, params, directions)
+            jacobians.check_enters_alone(places[name][1], name)
+            directions[start + places[name][0], k] = 1.0
+        found = jacobians.jacobian(reading, x0, u0, t, params, directions)
         return found["dx"], found["y"]
 
     def _call(

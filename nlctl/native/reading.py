@@ -90,6 +90,23 @@ class Reading:
             lambda: _Calling(cut=cut, reading=replace(self, schedule=replace(read, nodes=nodes))),
         ).reading
 
+    def with_float(self, name: str) -> Self:
+        """Return the diagram with an integer parameter of a third-party block as a float."""
+        layout = {
+            i: {
+                key: replace(slot, kind="f") if slot.name == name else slot
+                for key, slot in slots.items()
+            }
+            for i, slots in self.program.layout.items()
+        }
+        return self.cache.found(
+            _WithFloat,
+            lambda known: known.name == name,
+            lambda: _WithFloat(
+                name=name, reading=replace(self, program=replace(self.program, layout=layout))
+            ),
+        ).reading
+
     @cached_property
     def _captured(self) -> CapturedValues:
         return CapturedValues(self.schedule.captured)
@@ -143,6 +160,14 @@ class _Calling:
     """A diagram that was read again, with some functions called."""
 
     cut: frozenset[tuple[int, str]]
+    reading: Any
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _WithFloat:
+    """A diagram in which a parameter that was an integer is a float."""
+
+    name: str
     reading: Any
 
 

@@ -26,7 +26,7 @@ class Branch:
     """One side of a jump."""
 
     now: Expr  # the side that the arguments are on
-    level: Expr  # a smooth function that is at a fixed value where the side is left
+    level: Expr  # what is 0 where the side is left, and smooth there
     extent: Expr  # of what size the numbers are that it is the difference of
     margin: Expr  # at least 0 as long as the arguments are on the side that is kept
     value: Expr  # the operation, with the side that is kept
@@ -45,7 +45,7 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
     if op in _WHOLE:
         (z,) = numbers
         now = graph.op(op, z)
-        return _side_of(graph, now, z, [z], _within(graph, op, z, kept), kept)
+        return _side_of(graph, now, _beyond(graph, op, z), [z], _within(graph, op, z, kept), kept)
     if op in _QUOTIENTS:
         over, under = numbers
         z, rounding = graph.op("div", over, under), _QUOTIENTS[op]
@@ -54,7 +54,8 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
         now = graph.op("rint", graph.op("div", whole, under))  # as many as the operation takes off
         other = graph.op("sub", over, graph.op("mul", kept, under))
         value = graph.op("select", graph.op("eq", kept, now), rest, other)  # to the last digit
-        return _side_of(graph, now, z, [z], _within(graph, rounding, z, kept), value)
+        level, margin = _beyond(graph, rounding, z), _within(graph, rounding, z, kept)
+        return _side_of(graph, now, level, [z], margin, value)
     return _of_sign(graph, op, numbers, kept)
 
 
@@ -104,6 +105,17 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
         angle = graph.op("arctan2", *numbers)
         value = graph.op("add", angle, graph.op("select", left, reflected, const(0.0)))
     return _side_of(graph, now, level, [level], margin, value)
+
+
+def _beyond(graph: Graph, rounding: str, z: Expr) -> Expr:
+    """Return how far `z` is beyond the nearest number at which its rounding jumps."""
+    nearest = graph.op("rint", z)
+    if rounding == "rint":
+        nearest = graph.op("add", graph.op("floor", z), graph.const(0.5))
+    elif rounding == "trunc":  # it does not jump at 0
+        least = graph.op("maximum", graph.op("absolute", nearest), graph.const(1.0))
+        nearest = graph.op("copysign", least, z)
+    return graph.op("sub", z, nearest)
 
 
 def _within(graph: Graph, rounding: str, z: Expr, kept: Expr) -> Expr:

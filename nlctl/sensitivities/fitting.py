@@ -17,10 +17,11 @@ from ..names import unknown
 from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
+from ..native.jacobians import with_floats
 from ..params import as_numbers
 from .fitted import Fit, FittedExperiment
 from .measured import Measurement, Observations, check_tell, measurements, observations
-from .names import VariedQuantity, parameters_and_states, varied_quantities
+from .names import VariedQuantity, checked_names, parameters_and_states, varied_quantities
 from .record import SensitivityResponse
 from .response import sensitivity_response
 
@@ -131,6 +132,7 @@ def fit(
         first = measured[0]
         given = 0.0 if first.inputs is None else first.inputs
         diagram = compile_diagram(sized(diagram, given, first.initial_state), params=params)
+    diagram = with_floats(diagram, checked_names("parameters", list(parameters)))
     observed = observations(measured, diagram.system)
     sought = _sought(diagram, parameters, separate, [one.name for one in observed])
     check_tell(observed, list(parameters), len(sought.names))

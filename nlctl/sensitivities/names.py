@@ -20,6 +20,7 @@ from ..native.jacobians import check_enters_alone, float_parameters
 from ..params import declared_params
 
 _AT_START = "(0)"
+_WHOLE = {"i": "an integer", "b": "True or False"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +60,7 @@ def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> l
         name: Observed(name="", combination=combination)
         for name, combination in zip(outputs, read.outputs, strict=False)
     }
-    asked_for = _checked("of", outputs if names is None else names)
+    asked_for = checked_names("of", outputs if names is None else names)
     full = [name if name in signals else find_name("signal", name, signals) for name in asked_for]
     return [
         Observed(name=name, combination=signals[k].combination, state=signals[k].state)
@@ -67,12 +68,12 @@ def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> l
     ]
 
 
-def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[VariedQuantity]:
+def varied_quantities(compiled: Compiled, names: Sequence[str]) -> list[VariedQuantity]:
     """Return parameters and initial states by their names."""
     states = {name: i for i, name in enumerate(state_names(compiled.system))}
     parameters = float_parameters(compiled)
     quantities = []
-    for name in _checked("with_respect_to", names):
+    for name in names:
         if name.endswith(_AT_START):
             state = find_name("state", name.removesuffix(_AT_START), states)
             quantities.append(VariedQuantity(name=name, state=states[state]))
@@ -96,12 +97,12 @@ def parameters_and_states(given: Mapping[str, Any]) -> tuple[dict[str, Any], dic
 
 
 def _check_float(compiled: Compiled, name: str) -> None:
-    """Refuse an integer, which does not change by a little."""
+    """Refuse an integer of our blocks, and what is true or false."""
     for slot in (s for slots in compiled.program.layout.values() for s in slots.values()):
         if slot.name == name and slot.kind != "f":
             raise ParameterError(
-                f"'{name}' is an integer in '{compiled.system.name}', no float: "
-                "write its value as 2.0 instead of 2 if it may lie between two integers"
+                f"'{name}' is {_WHOLE[slot.kind]} in '{compiled.system.name}': what does not "
+                "change by a little has no derivative; take runs with other values"
             )
 
 
@@ -145,7 +146,8 @@ def declared_bounds(owner: Node, name: str) -> tuple[float, float]:
     return low, high
 
 
-def _checked(what: str, names: object) -> list[str]:
+def checked_names(what: str, names: object) -> list[str]:
+    """Return some names as a list; one may stand alone."""
     names = [names] if isinstance(names, str) else names
     if not isinstance(names, list | tuple) or not all(isinstance(n, str) for n in names):
         raise ParameterError(f"{what} needs a list of names, got {names!r}")

@@ -16,14 +16,14 @@ from ..native import Compiled
 from ..native.audit import Trial, audit
 from ..native.driver import Course, begin, prepared, run_once
 from ..native.integrate.state import Status
-from ..native.jacobians import inexact, searches_of
+from ..native.jacobians import inexact, searches_of, with_floats
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..responses.arguments import input_array, state_array
 from .directions import SomeRows
 from .missing import missing
-from .names import Observed, VariedQuantity, observed_signals, varied_quantities
+from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 
@@ -50,12 +50,14 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
             f"'{compiled.system.name}' is in discrete time: derivatives of runs are for diagrams "
             "in continuous time; nlctl.sampled has blocks with a clock in these"
         )
+    names = checked_names("with_respect_to", run.with_respect_to)
+    compiled = with_floats(compiled, names)
     p = compiled.parameter_vector(run.params)
     cut = compiled.equations_with(p).cut
     if cut and _alone(compiled, run).statistics.called:  # it takes more passes than are written out
         compiled = compiled.calling(cut)
     signals = observed_signals(compiled, run.of)
-    quantities = varied_quantities(compiled, run.with_respect_to)
+    quantities = varied_quantities(compiled, names)
     u = input_array(compiled.system, run.inputs, run.times)
     x0 = state_array(compiled.system, run.initial_state)
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
@@ -68,9 +70,9 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
-    names = tuple(quantity.name for quantity in quantities)
+    full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
-    lacks = missing(differentiated, (compiled, names), reached, given, beginning)
+    lacks = missing(differentiated, (compiled, full), reached, given, beginning)
     return _response(differentiated, (signals, quantities), (run.times, reached), scale, lacks)
 
 

@@ -20,12 +20,12 @@ from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..native.ensemble import MetricLike
-from ..native.jacobians import float_parameters
+from ..native.jacobians import float_parameters, with_floats
 from ..params import as_numbers, checked_times, integer
 from ..responses.arguments import input_array, state_array
 from ..wording import counted
 from .climbing import lower_cost, raise_least_margin
-from .names import declared_bounds
+from .names import checked_names, declared_bounds
 from .tuned import Tuned
 from .worth import LOST_MARGIN, Runs, TuningProblem, Worth, checked_samples
 
@@ -300,6 +300,7 @@ def _problem(
     tolerances("tune", how["rtol"], how["atol"])
     if not isinstance(diagram, Compiled):
         diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
+    diagram = with_floats(diagram, checked_names("space", [name for name, _ in _bounds(space)]))
     margins = _margins(spec, cost)
     params, initial_state = dict(params or {}), dict(initial_state or {})
     present = _present_values(diagram, params, initial_state)

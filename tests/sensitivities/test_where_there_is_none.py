@@ -282,16 +282,73 @@ def test_names(of, by, error, match):
         nlctl.sensitivity_response(jumping_rate(), [0, 1], of=of, with_respect_to=by)
 
 
-def test_an_integer_is_no_float():
-    """A parameter that is written as 2 is an integer: that is said, and what to write."""
-    plant = ct.nlsys(lambda t, x, u, p: [-p["a"] * x[0]], None, inputs=0, outputs=["x"],
-                     states=["x"], params={"a": 2}, name="plant")  # fmt: skip
-    with pytest.raises(nlctl.errors.ParameterError, match="is an integer"):
-        nlctl.sensitivity_response(plant, [0, 1], with_respect_to=["plant.a"])
+def test_a_gain_that_is_written_as_2_is_2_point_0():
+    """x' = -a x with a = 2: the derivative by a, and what its function says of it at a point."""
+    plant = block(lambda t, x, u, p: [-p["a"] * x[0]], {"a": 2})
     made = nlctl.sensitivity_response(
-        plant, [0, 1], initial_state=[1.0], params={"a": 2.0}, with_respect_to=["plant.x(0)"]
+        plant, [0, 1], initial_state=[1.0], with_respect_to=["plant.a", "plant.x(0)"]
     )
+    assert made["x", "plant.a"][-1] == pytest.approx(-np.exp(-2), abs=1e-8)
     assert made["x", "plant.x(0)"][-1] == pytest.approx(np.exp(-2), abs=1e-8)
+    assert nlctl.compile(plant).parameter_jacobian(["plant.a"], [3.0])[0] == [[-3.0]]
+
+
+def rounded_off(t, x, u, p):
+    kept = np.array([p["a"], 0])
+    kept[1] = 1.5 * x[0]  # an integer for an integer a
+    return [-kept[1]]
+
+
+@pytest.mark.parametrize(
+    ("plant", "error", "match"),
+    [
+        (block(lambda t, x, u, p: [-sum(x[0] ** k for k in range(p["a"]))], {"a": 2}),
+         "ParameterError", "'plant.a' is an integer in 'plant' and cannot lie between two"),
+        (block(rounded_off, {"a": 2}), "AuditError", "python-control differ"),
+        (block(lambda t, x, u, p: [-x[0] if p["a"] else 0.0], {"a": True}),
+         "ParameterError", "'plant.a' is True or False"),
+    ],
+)  # fmt: skip
+def test_an_integer_is_no_float(plant, error, match):
+    """A number of passes, one that makes other numbers integers, and a choice."""
+    with pytest.raises(getattr(nlctl.errors, error), match=match):
+        nlctl.sensitivity_response(plant, [0, 1], initial_state=[1.3], with_respect_to=["plant.a"])
+
+
+ROUNDED = [  # where it does not jump, and where it does
+    (np.round, (-1.0, 0.0, 1.0), (-0.5, 0.5, 2.5)),
+    (np.floor, (-0.5, 0.5), (-1.0, 0.0, 2.0)),
+    (np.ceil, (-0.5, 0.5), (-1.0, 0.0, 2.0)),
+    (np.trunc, (-0.5, 0.0, 0.5), (-2.0, -1.0, 1.0, 3.0)),
+    (lambda z: z % 1.0, (-0.5, 0.5), (-1.0, 0.0, 2.0)),
+    (lambda z: np.fmod(z, 1.0), (-0.5, 0.0, 0.5), (-2.0, 1.0)),
+]
+
+
+@pytest.mark.parametrize(("rounded", "inside", "jumps"), ROUNDED)
+def test_start_where_a_number_is_rounded(rounded, inside, jumps):
+    """A run starts on a condition where a rounding jumps, and nowhere else."""
+    plant = block(lambda t, x, u, p: [p["k"], rounded(x[0])], {"k": 0.1}, ("x", "z"))
+    for start in (*inside, *jumps):
+        made = nlctl.sensitivity_response(
+            plant, [0, 1], initial_state=[start, 0.0], of=["z"], with_respect_to=["plant.x(0)"]
+        )
+        assert bool(made.missing) == (start in jumps), start
+
+
+@pytest.mark.parametrize(("rounded", "inside", "jumps"), ROUNDED)
+def test_touching_where_a_number_is_rounded(rounded, inside, jumps):
+    """x = level + sin t - 1 touches the level at pi / 2: that says nothing where nothing jumps."""
+    plant = block(lambda t, x, u, p: [np.cos(t), rounded(x[0] + p["p"])], {"p": 0.0}, ("x", "z"))
+    for level in (*inside, *jumps):
+        made = nlctl.sensitivity_response(
+            plant, [0, 1, 2], 0, [level - 1, 0.0], of=["z"], with_respect_to=["plant.p"]
+        )
+        grazed = [lack for lack in made.missing if lack.time > 0.1]
+        assert bool(grazed) == (level in jumps), level
+        for lack in grazed:
+            assert abs(lack.time - np.pi / 2) < 1e-4
+            assert "grazing" in lack.why
 
 
 def test_names_of_a_response():
