@@ -23,7 +23,7 @@ from ..responses.watched import Watched
 from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
-from . import jacobians
+from . import floats, jacobians
 from .describe import called, described
 from .diagram.checks import check_sizes
 from .diagram.parameters import length
@@ -286,8 +286,8 @@ class Compiled(Reading, StandIn):
             As `linearize`, if there is no such parameter, and if numbers follow from it outside of
             the equations, by a record's `derived`.
         """
-        reading = jacobians.with_floats(self, parameters)
-        places = jacobians.float_parameters(reading)
+        reading = floats.with_floats(self, parameters)
+        places = floats.float_parameters(reading)
         jacobians.tell_of_differences(self, self.parameter_vector(params))  # blocks have these
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
@@ -30,7 +30,6 @@ from .equations.blocks import Equations
 from .lower import DIRECTION
 from .reading import Reading
 
-_Read = TypeVar("_Read", bound=Reading)
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
@@ -231,43 +230,6 @@ def _sampled_map(
         step[places] = found[f"sample{which}"][at : at + array.size]
         at += array.size
     return step
-
-
-def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
-    """Return the parameters that can be differentiated by: place in `p`, and whose they are."""
-    # Entries of arrays have their index in their names.
-    found = {}
-    for i, own in reading.program.layout.items():
-        for slot in own.values():
-            for k in range(slot.size if slot.kind == "f" else 0):
-                name = f"{slot.name}[{k}]" if slot.shape else slot.name
-                found[name] = slot.offset + k, reading.schedule.holders[i]
-    return found
-
-
-def with_floats(reading: _Read, names: Collection[str]) -> _Read:
-    """Return a diagram in which parameters that are written as 2 may lie between two integers."""
-    # a gain of 2 means 2.0 where its function takes both; the audit of a run compares them
-    bare = tuple(name.partition("[")[0] for name in names)
-    for i, own in reading.program.layout.items():
-        for slot in own.values():
-            meant = any(f".{slot.name}".endswith(f".{name}") for name in bare)
-            ours = isinstance(reading.schedule.holders[i].system, Block)
-            if slot.kind == "i" and meant and not ours:
-                reading = _with_float(reading, slot.name)
-    return reading
-
-
-def _with_float(reading: _Read, name: str) -> _Read:
-    """Return a diagram in which one of them is a float, if its functions take that."""
-    changed = reading.with_float(name)
-    calls = changed.equations.calls
-    for call in calls.keys() - reading.equations.calls.keys():
-        raise ParameterError(
-            f"'{name}' is an integer in '{reading.system.name}' and cannot lie between two: "
-            f"{calls[call].reason}"
-        )
-    return changed
 
 
 def check_enters_alone(node: Node, name: str) -> None:

@@ -90,20 +90,20 @@ class Reading:
             lambda: _Calling(cut=cut, reading=replace(self, schedule=replace(read, nodes=nodes))),
         ).reading
 
-    def with_float(self, name: str) -> Self:
-        """Return the diagram with an integer parameter of a third-party block as a float."""
+    def with_floats(self, names: frozenset[str]) -> Self:
+        """Return the diagram with integers among its parameters, by full names, as floats."""
         layout = {
             i: {
-                key: replace(slot, kind="f") if slot.name == name else slot
+                key: replace(slot, kind="f") if slot.name in names else slot
                 for key, slot in slots.items()
             }
             for i, slots in self.program.layout.items()
         }
         return self.cache.found(
-            _WithFloat,
-            lambda known: known.name == name,
-            lambda: _WithFloat(
-                name=name, reading=replace(self, program=replace(self.program, layout=layout))
+            _WithFloats,
+            lambda known: known.names == names,
+            lambda: _WithFloats(
+                names=names, reading=replace(self, program=replace(self.program, layout=layout))
             ),
         ).reading
 
@@ -164,10 +164,10 @@ class _Calling:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _WithFloat:
-    """A diagram in which a parameter that was an integer is a float."""
+class _WithFloats:
+    """A diagram in which parameters that were integers are floats."""
 
-    name: str
+    names: frozenset[str]
     reading: Any
 
 

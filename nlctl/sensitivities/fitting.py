@@ -17,7 +17,7 @@ from ..names import unknown
 from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
-from ..native.jacobians import with_floats
+from ..native.floats import with_floats
 from ..params import as_numbers
 from .fitted import Fit, FittedExperiment
 from .measured import Measurement, Observations, check_tell, measurements, observations

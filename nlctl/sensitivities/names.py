@@ -16,7 +16,8 @@ from ..names import find_name, unknown
 from ..native import Compiled
 from ..native.diagram.nodes import Node
 from ..native.diagram.wiring import Signal as Output
-from ..native.jacobians import check_enters_alone, float_parameters
+from ..native.floats import float_parameters
+from ..native.jacobians import check_enters_alone
 from ..params import declared_params
 
 _AT_START = "(0)"

@@ -15,8 +15,9 @@ from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
 from ..native.driver import Course, begin, prepared, run_once
+from ..native.floats import with_floats
 from ..native.integrate.state import Status
-from ..native.jacobians import inexact, searches_of, with_floats
+from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings

@@ -20,7 +20,7 @@ from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..native.ensemble import MetricLike
-from ..native.jacobians import float_parameters, with_floats
+from ..native.floats import float_parameters, with_floats
 from ..params import as_numbers, checked_times, integer
 from ..responses.arguments import input_array, state_array
 from ..wording import counted

@@ -20,6 +20,7 @@ from nlctl import actuators, sources
 from nlctl.errors import CompileError, DivergedError, ParameterError, UsageError
 from nlctl.export.web import handles, web_program
 from nlctl.export.web.rounding import integrators_alike
+from nlctl.native.floats import with_every_float
 from nlctl.native.machine.finish import finished
 
 HERE = Path(__file__).parent
@@ -342,6 +343,20 @@ def test_converters_of_a_sampled_law_can_be_moved():
     loop = loop_with(nlctl.Gain(), input_quantum=0.01)
     (handle,) = moved(loop, "law.sampling.input_quantum")
     assert (handle.value, handle.low, handle.high) == (0.01, 0.0, 0.02)
+
+
+def test_a_gain_that_is_written_as_2_can_be_moved():
+    """Between two integers as well; a number of passes cannot."""
+    plant = ct.nlsys(
+        lambda t, x, u, p: [-p["a"] * sum(x[0] for _ in range(p["n"]))], None,
+        inputs=0, states=["x"], params={"a": 2, "n": 2}, name="plant",
+    )  # fmt: skip
+    lag = with_every_float(nlctl.compile(plant))
+    given = lag.parameter_vector(), np.array([1.0]), np.zeros((0, 2)), (0.0, 1.0)
+    (handle,) = handles(lag, ["plant.a"], *given)
+    assert (handle.value, handle.low, handle.high) == (2.0, 0.0, 4.0)
+    with pytest.raises(ParameterError, match="is an integer or a choice"):
+        handles(lag, ["plant.n"], *given)
 
 
 def test_bounds_have_all_their_digits():

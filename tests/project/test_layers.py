@@ -63,7 +63,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["lower"],
         ["reading"],
         ["machine"],
-        ["enclosures", "jacobians"],
+        ["enclosures", "floats", "jacobians"],
         ["describe"],
         ["compiled"],
         ["cut_delays", "ensemble_result", "integrate", "members"],

@@ -5,7 +5,7 @@ import pytest
 from examples import many, parted, some
 
 import nlctl
-from nlctl.native.jacobians import float_parameters
+from nlctl.native.floats import float_parameters
 
 TIMES = np.linspace(0, 10, 41)
 EXAMPLES = {  # every second of them each day

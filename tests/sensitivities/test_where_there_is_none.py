@@ -303,7 +303,7 @@ def rounded_off(t, x, u, p):
     ("plant", "error", "match"),
     [
         (block(lambda t, x, u, p: [-sum(x[0] ** k for k in range(p["a"]))], {"a": 2}),
-         "ParameterError", "'plant.a' is an integer in 'plant' and cannot lie between two"),
+         "ParameterError", "'plant.a' in 'plant' cannot lie between two integers"),
         (block(rounded_off, {"a": 2}), "AuditError", "python-control differ"),
         (block(lambda t, x, u, p: [-x[0] if p["a"] else 0.0], {"a": True}),
          "ParameterError", "'plant.a' is True or False"),

@@ -14,6 +14,7 @@ from ...annotations import as_annotated
 from ...attributes import described_record
 from ...errors import CompileError, ParameterError
 from ...native.driver import Course, prepared
+from ...native.floats import with_every_float
 from ...native.integrate.log import Log
 from ...native.integrate.memory import arrays_alike, with_fields
 from ...native.integrate.methods.lu import WHOLE
@@ -121,7 +122,7 @@ def web_program(
     (b'\\x00asm', ('plant_x1', 'plant_x2'))
     """
     check_linker()
-    compiled, what = native.compile(diagram), str(diagram.name)
+    compiled, what = with_every_float(native.compile(diagram)), str(diagram.name)
     p = compiled.parameter_vector(params)
     _check(compiled, what, p)
     grid = np.asarray(times, dtype=float)

@@ -1,0 +1,78 @@
+"""Parameters that may lie between two integers.
+
+Users write a gain as 2 and mean 2.0.  A function that is handed an integer may count with it, so
+that what is read of it holds for integers alone.  Where something is to move by a little, such a
+parameter is a float in the equations, which are read again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection
+from typing import TypeVar
+
+from ..blocks import Block
+from ..errors import ParameterError
+from .diagram.nodes import Node
+from .reading import Reading
+
+_Read = TypeVar("_Read", bound=Reading)
+
+
+def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
+    """Return the parameters that can be differentiated by: place in `p`, and whose they are."""
+    # Entries of arrays have their index in their names.
+    found = {}
+    for i, own in reading.program.layout.items():
+        for slot in own.values():
+            for k in range(slot.size if slot.kind == "f" else 0):
+                name = f"{slot.name}[{k}]" if slot.shape else slot.name
+                found[name] = slot.offset + k, reading.schedule.holders[i]
+    return found
+
+
+def with_floats(reading: _Read, names: Collection[str]) -> _Read:
+    """Return a diagram in which parameters by these names, short ones too, are floats."""
+    # the audit of a run compares the equations with functions that are handed the integers
+    bare = tuple(name.partition("[")[0] for name in names)
+    meant = [
+        name for name in _integers(reading) if any(f".{name}".endswith(f".{end}") for end in bare)
+    ]
+    return _changed(reading, meant)
+
+
+def with_every_float(reading: _Read) -> _Read:
+    """Return a diagram in which all parameters are floats that can be."""
+    names = [n for n, place in _integers(reading).items() if place not in reading.lowered.assumed]
+    with contextlib.suppress(ParameterError):
+        return _changed(reading, names)
+    for name in names:
+        with contextlib.suppress(ParameterError):
+            reading = _changed(reading, [name])
+    return reading
+
+
+def _integers(reading: Reading) -> dict[str, int]:
+    """Return names and places of integers of third-party blocks: ours say what is one."""
+    return {
+        slot.name: slot.offset
+        for i, own in reading.program.layout.items()
+        if not isinstance(reading.schedule.holders[i].system, Block)
+        for slot in own.values()
+        if slot.kind == "i"
+    }
+
+
+def _changed(reading: _Read, names: Collection[str]) -> _Read:
+    """Return a diagram in which some integers are floats, if its functions take that."""
+    if not names:
+        return reading
+    changed = reading.with_floats(frozenset(names))
+    calls = changed.equations.calls
+    for call in calls.keys() - reading.equations.calls.keys():
+        named = ", ".join(f"'{name}'" for name in names)
+        raise ParameterError(
+            f"{named} in '{reading.system.name}' cannot lie between two integers: "
+            f"{calls[call].reason}"
+        )
+    return changed
