@@ -38,6 +38,7 @@ from .compiled import Compiled
 from .compiled import compile as compile_diagram
 from .driver import Course, begin, called_instead, finish, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike, SignalsByName
+from .floats import as_given
 from .happened import happened
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
@@ -162,7 +163,9 @@ def ensemble_response(
     if threads is not None:
         threads = integer("ensemble_response", "threads", threads, at_least=1)
     one_of("ensemble_response", "hold", hold, HOLDS)
-    every = members(compiled, checked_params(params) or {}, given["initial_state"])
+    params = checked_params(params) or {}
+    compiled = as_given(compiled, params)
+    every = members(compiled, params, given["initial_state"])
     _check_signals(compiled, keep, metrics)
     if max_step is not None:
         checked_number("ensemble_response", "max_step", max_step, above=0)

@@ -8,10 +8,11 @@ parameter is a float in the equations, which are read again.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection
-from typing import TypeVar
+from collections.abc import Collection, Mapping
+from typing import Any, TypeVar
 
-from ..blocks import Block
+import numpy as np
+
 from ..errors import ParameterError
 from .diagram.nodes import Node
 from .reading import Reading
@@ -34,33 +35,30 @@ def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
 def with_floats(reading: _Read, names: Collection[str]) -> _Read:
     """Return a diagram in which parameters by these names, short ones too, are floats."""
     # the audit of a run compares the equations with functions that are handed the integers
-    bare = tuple(name.partition("[")[0] for name in names)
-    meant = [
-        name for name in _integers(reading) if any(f".{name}".endswith(f".{end}") for end in bare)
-    ]
-    return _changed(reading, meant)
+    ends = tuple(f".{name.partition('[')[0]}" for name in names)
+    return _changed(reading, [name for name in reading.integers if f".{name}".endswith(ends)])
+
+
+def as_given(reading: _Read, params: Mapping[str, Any] | None) -> _Read:
+    """Return a diagram that takes parameters as they are given, floats for integers too."""
+    return with_floats(reading, [name for name, value in (params or {}).items() if _between(value)])
+
+
+def _between(value: object) -> bool:
+    """Whether a value, or one of many, lies between two integers."""
+    array = np.asarray(value)
+    return array.dtype.kind == "f" and not np.array_equal(array, np.trunc(array), equal_nan=True)
 
 
 def with_every_float(reading: _Read) -> _Read:
     """Return a diagram in which all parameters are floats that can be."""
-    names = [n for n, place in _integers(reading).items() if place not in reading.lowered.assumed]
+    names = [n for n, place in reading.integers.items() if place not in reading.lowered.assumed]
     with contextlib.suppress(ParameterError):
         return _changed(reading, names)
     for name in names:
         with contextlib.suppress(ParameterError):
             reading = _changed(reading, [name])
     return reading
-
-
-def _integers(reading: Reading) -> dict[str, int]:
-    """Return names and places of integers of third-party blocks: ours say what is one."""
-    return {
-        slot.name: slot.offset
-        for i, own in reading.program.layout.items()
-        if not isinstance(reading.schedule.holders[i].system, Block)
-        for slot in own.values()
-        if slot.kind == "i"
-    }
 
 
 def _changed(reading: _Read, names: Collection[str]) -> _Read:

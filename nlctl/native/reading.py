@@ -19,6 +19,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..blocks import Block
 from ..diagrams import Apart, initial_state, override
 from ..diagrams.third_party import own_attributes
 from ..errors import UsageError
@@ -90,22 +91,32 @@ class Reading:
             lambda: _Calling(cut=cut, reading=replace(self, schedule=replace(read, nodes=nodes))),
         ).reading
 
-    def with_floats(self, names: frozenset[str]) -> Self:
-        """Return the diagram with integers among its parameters, by full names, as floats."""
-        layout = {
-            i: {
-                key: replace(slot, kind="f") if slot.name in names else slot
-                for key, slot in slots.items()
-            }
-            for i, slots in self.program.layout.items()
+    @cached_property
+    def integers(self) -> dict[str, int]:
+        """Names and places of integers of third-party blocks: ours say what is one."""
+        return {
+            slot.name: slot.offset
+            for i, own in self.program.layout.items()
+            if not isinstance(self.schedule.holders[i].system, Block)
+            for slot in own.values()
+            if slot.kind == "i"
         }
-        return self.cache.found(
-            _WithFloats,
-            lambda known: known.names == names,
-            lambda: _WithFloats(
-                names=names, reading=replace(self, program=replace(self.program, layout=layout))
-            ),
-        ).reading
+
+    def with_floats(self, names: frozenset[str]) -> Self:
+        """Return the diagram with some of these integers as floats."""
+
+        def changed() -> _WithFloats:
+            layout = {
+                i: {
+                    key: replace(slot, kind="f") if slot.name in names else slot
+                    for key, slot in own.items()
+                }
+                for i, own in self.program.layout.items()
+            }
+            program = replace(self.program, layout=layout)
+            return _WithFloats(names=names, reading=replace(self, program=program))
+
+        return self.cache.found(_WithFloats, lambda one: one.names == names, changed).reading
 
     @cached_property
     def _captured(self) -> CapturedValues:

@@ -21,6 +21,7 @@ from .chattering.place import chattering_words
 from .compiled import Compiled, with_watched
 from .describe import described_functions
 from .driver import Course, trajectory
+from .floats import as_given
 from .integrate.state import Status
 from .own_errors import own_error
 from .reading import Resolved
@@ -48,6 +49,7 @@ def respond(
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments."""
     system = compiled.system
     compiled = with_watched(compiled, (*watched, *nan_watchers(watched)), params)
+    compiled = as_given(compiled, params)
     evaluated = evaluation_array(evaluation_times, times)
     u, resolved = input_array(system, inputs, times), compiled.resolved(params)
     own = initial_state is None

@@ -5,10 +5,11 @@ import math
 import control as ct
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from plain_plan import compare
 
 import nlctl
-from nlctl.errors import UsageError
+from nlctl.errors import ParameterError, UsageError
 from nlctl.native.compiled import compile as compile_diagram
 
 TOLERANCES = {"rtol": 1e-9, "atol": 1e-11}
@@ -261,7 +262,7 @@ def test_parameters_that_are_no_numbers_are_constants(params, native):
         ({"offset": 1.0}, r"'tuned\.offset' is not a number and was None .* cannot be 1\.0 now"),
         ({"shape": bend}, r"'tuned\.shape' is not a number .* compile again"),
         ({"gain": "high"}, r"block 'tuned' needs a number for gain, as it declares, got 'high'"),
-        ({"gain": 2.5}, r"'tuned\.gain' was an integer .* cannot be 2\.5 .* float \(2\.0\)"),
+        ({"gain": 2.5}, r"'tuned\.gain' was an integer .* cannot be 2\.5 .* as a float, with"),
         ({"table": [[1, 2]]}, r"'tuned\.table' had shape \(2, 2\) .* have shape \(1, 2\)"),
     ],
 )
@@ -272,6 +273,25 @@ def test_what_is_compiled_in_cannot_change_per_run(override, words):
         compiled.parameter_vector(override)
     compiled.parameter_vector({"gain": 3.0, "mode": "double"})
     compiled.parameter_vector({"gain": True})
+
+
+def test_a_rate_that_is_written_as_2_may_be_two_and_a_half():
+    """x' = -a x with a = 2: of runs of what was compiled, and of members; not with passes."""
+    t = np.linspace(0.0, 1.0, 11)
+    decay = ct.nlsys(lambda t, x, u, p: [-p["a"] * x[0]], None, inputs=0, states=["x"],
+                     outputs=["x"], params={"a": 2}, name="decay")  # fmt: skip
+    compiled = compile_diagram(decay)
+    for a in (2, 2.5, 3):
+        run = nlctl.input_output_response(compiled, t, 0, [1.0], params={"decay.a": a})
+        assert_allclose(run.outputs[0], np.exp(-a * t), atol=1e-8)
+    rates = np.array([1.0, 2.0, 2.5])
+    for diagram, name in ((decay, "decay.a"), (compiled, "a")):
+        many = nlctl.ensemble_response(diagram, t, 0, [1.0], params={name: rates}, keep=["x"])
+        assert_allclose(many.signals["x"], np.exp(-rates[:, None] * t), atol=1e-8)
+    passes = ct.nlsys(lambda t, x, u, p: [-sum(x[0] for _ in range(p["a"]))], None, inputs=0,
+                      states=["x"], outputs=["x"], params={"a": 2}, name="passes")  # fmt: skip
+    with pytest.raises(ParameterError, match=r"'passes\.a' .* cannot lie between two integers"):
+        nlctl.ensemble_response(passes, t, 0, [1.0], params={"passes.a": rates})
 
 
 @pytest.mark.parametrize("native", [False, True])

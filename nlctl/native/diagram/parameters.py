@@ -136,7 +136,7 @@ def filled(p: np.ndarray, slot: Slot, value: object) -> None:
     if whole and not slot.shape and array.dtype.kind == "f" and array != np.trunc(array):
         raise UsageError(
             f"parameter '{slot.name}' was {whole} when the diagram was compiled and cannot be "
-            f"{value!r} now: declare it as a float ({float(np.trunc(array))!r}), or compile with "
+            f"{value!r} now: declare it as a float, with a decimal point, or compile with "
             f"params={{'{slot.name.rpartition('.')[2]}': {value!r}}}"
         )
     p[slot.offset : slot.offset + slot.size] = array.ravel()
