@@ -283,8 +283,7 @@ class Compiled(Reading, StandIn):
         Raises
         ------
         CompileError, UnknownNameError, ParameterError
-            As `linearize`, if there is no such parameter, and if numbers follow from it outside of
-            the equations, by a record's `derived`.
+            As `linearize`, if there is no such parameter, or if others follow by `derived`.
         """
         reading = floats.with_floats(self, parameters)
         places = floats.float_parameters(reading)
@@ -337,7 +336,8 @@ class Compiled(Reading, StandIn):
 
 def as_compiled(system: System | Compiled, params: Mapping[str, Any] | None = None) -> Compiled:
     """Return a diagram, compiled unless it is already."""
-    return system if isinstance(system, Compiled) else compile(system, params=params)
+    made = system if isinstance(system, Compiled) else compile(system, params=params)
+    return floats.as_given(made, params)
 
 
 @as_annotated
