@@ -83,11 +83,23 @@ def test_and_binds_tighter_than_or_and_prefixes_tighter_than_both():
     assert str(parse_formula("not a <= 1 and b <= 2")) == "(not a <= 1 and b <= 2)"
 
 
+@given(st.floats(-100, 100), st.floats(0.001, 100))
+def test_a_band_around_a_number(middle, half):
+    """|y - 1| <= 0.5 is 0.5 <= y <= 1.5, with the sign next to either."""
+    sign = "-" if middle >= 0 else "+"
+    for text in (f"|y {sign} {abs(middle)!r}| <= {half!r}", f"|y {sign}{abs(middle)!r}| <= {half}"):
+        band = parse_formula(text)
+        assert (band.lower, band.upper) == (middle - half, middle + half)
+
+
 @each_row(
     ("text", "message"),
     [
         ("", "needs a band such as |e| <= 0.15, found the end"),
         ("|e| < 0.15", "needs '<=', found '<' at character 5"),
+        ("|y - r| <= 1", "needs a number behind '-' (a difference of two signals is an output of"),
+        ("|y -| <= 1", "needs a number, found '|' at character 5"),
+        ("y - 1 <= 2", "needs '<=' or '>=', found '-' at character 3"),
         ("e <= 1 u <= 2", "needs 'and', 'or' or the end, found 'u' at character 8"),
         ("always in [3, 1] s e <= 1", "'always' needs 0 <= start <= end"),
         ("always in [1, 2] e <= 1", "needs 's', found 'e' at character 18"),

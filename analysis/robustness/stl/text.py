@@ -4,7 +4,7 @@
     both     = part ("and" part)*
     part     = "not" part | ("always" | "eventually") [window] part | "(" formula ")" | band
     window   = "in" "[" number "," number "]" "s" | "from" number "s" "on"
-    band     = "|" signal "|" "<=" number | signal ("<=" | ">=") number
+    band     = "|" signal [("+" | "-") number] "|" "<=" number | signal ("<=" | ">=") number
              | number "<=" signal "<=" number
 
 "not", "always" and "eventually" hold for the next part only; use parentheses for more.  A part that
@@ -25,7 +25,7 @@ from .formula import And, Formula, always, begins_window, eventually, in_band, l
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
 _TOKEN = re.compile(
-    rf"\s*(?:(?P<number>{_NUMBER})|(?P<name>{_NAME})|(?P<sign><=|>=|[|()\[\],])|(\S))"
+    rf"\s*(?:(?P<number>{_NUMBER})|(?P<name>{_NAME})|(?P<sign><=|>=|[-+|()\[\],])|(\S))"
 )
 _WORDS = ("always", "and", "eventually", "from", "in", "not", "on", "or", "s")
 DEPTH = 50
@@ -192,10 +192,10 @@ def _window(reader: _Reader) -> tuple[float, float]:
 
 def _band(reader: _Reader) -> Formula:
     if reader.took("|"):
-        signal = reader.signal()
+        signal, middle = reader.signal(), _middle(reader)
         reader.take(["|", "<="])
         bound = reader.number()
-        return in_band(signal, lower=-bound, upper=bound)
+        return in_band(signal, lower=middle - bound, upper=middle + bound)
     if reader.kind == "number":
         lower = reader.number()
         reader.take(["<="])
@@ -212,3 +212,18 @@ def _band(reader: _Reader) -> Formula:
     near = nearest(signal, ("always", "eventually", "not"), 1, 0.7)
     meant = f" (is '{signal}' meant to be '{near[0]}'?)" if near else ""
     raise reader.error(f"'<=' or '>='{meant}")
+
+
+def _middle(reader: _Reader) -> float:
+    """Return around what a signal lies in |y - 1|, which is 0 in |y|."""
+    if reader.kind == "number" and reader.here[0] in "+-":
+        return -reader.number()
+    for sign, factor in (("-", 1.0), ("+", -1.0)):
+        if reader.took(sign):
+            if reader.kind == "name":
+                raise reader.error(
+                    f"a number behind '{sign}' (a difference of two signals is an output of the "
+                    "loop, such as e)"
+                )
+            return factor * reader.number()
+    return 0.0
