@@ -14,6 +14,7 @@ from ..diagrams import initial_state as state_of
 from ..diagrams import leaves, parameter_names
 from ..errors import CompileError, ParameterError
 from ..names import unknown
+from ..native.floats import with_every_float
 from ..native.lower import Lowered
 from ..sampling.system import Sampled, sampled
 from .records import ExportedController
@@ -81,7 +82,7 @@ def export_controller(
     """
     part = _sampled_part(_block_of(diagram, block), dt, method)
     alone = _alone(part)
-    compiled = native.compile(alone)
+    compiled = with_every_float(native.compile(alone))
     clock = _clock_of(compiled, block)
     p = compiled.parameter_vector(_parameters_of(part, block, diagram, params or {}))
     check_written_out(compiled, block, p)

@@ -10,6 +10,7 @@ import control as ct
 from .. import native
 from ..annotations import as_annotated
 from ..diagrams import initial_state as state_of
+from ..native.floats import with_every_float
 from .records import ExportedEquations
 from .words import (
     c_name,
@@ -63,7 +64,7 @@ def export_equations(
     >>> equations.states[:2]
     ('plant_x1', 'plant_x2')
     """
-    compiled = native.compile(diagram)
+    compiled = with_every_float(native.compile(diagram))
     what = str(diagram.name)
     _check_continuous(compiled, what)
     p = compiled.parameter_vector(params)

@@ -28,6 +28,17 @@ def test_rates_and_outputs_are_those_of_python_control(tmp_path, example):
         np.testing.assert_allclose(y, loop.output(t, x, u), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.ci
+def test_a_rate_that_is_written_as_2_may_be_two_and_a_half(tmp_path):
+    """A caller may set it in the parameters, and nothing cuts it to 2."""
+    lag = ct.nlsys(lambda t, x, u, p: [-p["a"] * x[0]], None, inputs=0, states=1, name="lag",
+                   params={"a": 2})  # fmt: skip
+    assert export_equations(lag, name="lag").parameters == {"lag.a": 2.0}
+    equations = export_equations(lag, params={"lag.a": 2.5}, name="lag")
+    ((dx, _),) = evaluated(tmp_path, equations, [(0.0, np.array([2.0]), np.zeros(1))])
+    assert dx == [-5.0]
+
+
 def test_conditions_and_memories_are_counted():
     """A dead zone has two kinks, a play remembers one state."""
     plant = ct.ss(-1, 1, 1, 0, inputs="v", outputs="y", name="plant")

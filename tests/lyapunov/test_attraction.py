@@ -50,6 +50,15 @@ def test_khalils_example_has_its_level():
     assert 2 * x @ np.array(KHALIL) @ np.array(van_der_pol(x)) >= -1e-8
 
 
+def test_a_parameter_that_is_written_as_1_may_be_a_half():
+    """x' = x^3 - a x with a = 1 / 2 goes to 0 from between -sqrt(a) and sqrt(a)."""
+    diagram = ct.nlsys(lambda t, x, u, p: [x[0] ** 3 - p["a"] * x[0]], None, states=["x"],
+                       inputs=0, params={"a": 1}, name="cubic")  # fmt: skip
+    for system in (diagram, nlctl.compile(diagram)):
+        found = region_of_attraction(system, Box.of(x=(-2, 2)), P=[[1.0]], params={"cubic.a": 0.5})
+        assert 0.4999 <= found.level <= 0.5
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_a_level_has_its_closed_form(n):
     """V = |x|^2 of x_i' = -x_i + x_i^3 falls up to |x| = 1, where one coordinate is 1."""

@@ -10,14 +10,13 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl import native
 from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
 from nlctl.expressions.continuity import may_jump
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
-from nlctl.native.compiled import Compiled
+from nlctl.native.compiled import Compiled, as_compiled
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of
 from nlctl.native.enclosures.rates import state_rates, with_leaves
 from nlctl.upstream.numba_internals import is_jit_disabled
@@ -87,7 +86,7 @@ def motion_of(
         raise ParameterError(f"{who} needs machine code: unset NUMBA_DISABLE_JIT")
     try:
         if isinstance(system, ct.InputOutputSystem | Compiled):
-            compiled = system if isinstance(system, Compiled) else native.compile(system)
+            compiled = as_compiled(system, params)
             names: Sequence[str] = state_names(compiled.system)
             rates = state_rates(compiled, dict(params or {}))
         elif isinstance(system, Callable):  # type: ignore[arg-type]

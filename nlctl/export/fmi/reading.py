@@ -14,6 +14,7 @@ from ...diagrams import supplied_blocks
 from ...errors import CompileError
 from ...native import Compiled
 from ...native.diagram.program import clocks_at, slots_of_clocks
+from ...native.floats import with_every_float
 from ...native.timed.ahead import ahead
 from ...sampling.clock import Clock, schedules
 from ...sliding.relay import SLIDING
@@ -34,7 +35,7 @@ def read_model(
     tolerance: float,
 ) -> Model:
     """Return what an FMU of a diagram is made of."""
-    compiled = native.compile(diagram)
+    compiled = with_every_float(native.compile(diagram))
     system, what, program = compiled.system, str(compiled.system.name), compiled.program
     p = compiled.parameter_vector(params)
     _check(compiled, what, p)

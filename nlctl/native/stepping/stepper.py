@@ -18,6 +18,7 @@ from ...responses.arguments import checked_params, state_array
 from ...upstream.systems import System
 from ...wording import counted
 from ..compiled import Compiled, as_compiled
+from ..floats import with_every_float
 from ..integrate.methods.tableau import Tableau
 from ..own_errors import own_error
 from ..response import failure
@@ -402,7 +403,7 @@ def stepper(
     settings = settings_of(
         method, rtol=rtol, atol=atol, max_steps=max_steps, max_step=max_step, step=step
     )
-    compiled = as_compiled(system)
+    compiled = with_every_float(as_compiled(system))
     period = compiled.system.dt
     if not ct.isctime(compiled.system) and period is not True and not np.isclose(period, dt):
         raise ParameterError(

@@ -17,6 +17,7 @@ from ...responses.arguments import checked_params
 from ...upstream.systems import System
 from ...wording import counted
 from ..compiled import Compiled, as_compiled
+from ..floats import with_every_float
 from ..integrate.methods.tableau import Tableau
 from ..members import members
 from .held import HeldRun
@@ -288,6 +289,6 @@ def vector_stepper(
     """
     size = integer("vector_stepper", "size", size, at_least=1)
     return VectorStepper(
-        as_compiled(system), dt, size, method=method, rtol=rtol, atol=atol, max_steps=max_steps,
-        max_step=max_step, step=step, audit=audit,
+        with_every_float(as_compiled(system)), dt, size, method=method, rtol=rtol, atol=atol,
+        max_steps=max_steps, max_step=max_step, step=step, audit=audit,
     )  # fmt: skip

@@ -205,6 +205,19 @@ def test_a_reset_takes_state_parameters_time_and_inputs():
     assert direct.reset(inputs=2.0) == [10.0]
 
 
+def test_a_rate_that_is_written_as_2_may_be_two_and_a_half():
+    """An episode with another value is exp(-a t)."""
+    decay = ct.nlsys(lambda t, x, u, p: [-p["a"] * x[0]], None, inputs=0, states=1, outputs=1,
+                     params={"a": 2}, name="decay")  # fmt: skip
+    one, many = nlctl.stepper(decay, 0.5), nlctl.vector_stepper(decay, 0.5, 3)
+    for a in (2, 2.5):
+        one.reset([1.0], params={"decay.a": a})
+        assert one.step()[0] == pytest.approx(np.exp(-0.5 * a), rel=1e-7)
+    rates = np.array([1.5, 2.0, 2.5])
+    many.reset([1.0], params={"decay.a": rates})
+    np.testing.assert_allclose(many.step()[:, 0], np.exp(-0.5 * rates), rtol=1e-7)
+
+
 def test_an_episode_does_not_remember_the_one_before():
     made, u = nlctl.stepper(memory(nlctl.Backlash()), DT), inputs(1, 30)
     first = stepped(made, u)
