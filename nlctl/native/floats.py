@@ -52,7 +52,8 @@ def _between(value: object) -> bool:
 
 def with_every_float(reading: _Read) -> _Read:
     """Return a diagram in which all parameters are floats that can be."""
-    names = [n for n, place in reading.integers.items() if place not in reading.lowered.assumed]
+    steering = reading.equations.graph.assumptions
+    names = [name for name, place in reading.integers.items() if place not in steering]
     with contextlib.suppress(ParameterError):
         return _changed(reading, names)
     for name in names:
