@@ -118,7 +118,9 @@ def equations_of(diagram: System, blocks: Collection[str], number: str = "") -> 
 
 
 def block_items(block: native.BlockEquations, number: str = "") -> Iterator[Item]:
-    """Yield a block's equations, and what their symbols stand for."""
+    """Yield a block's equations, and what their symbols stand for, or why there are none."""
+    if block.missing:
+        yield Paragraph(text=f"There is no formula of it: {block.missing}.")
     for i, line in enumerate((*block.inputs, *block.equations)):
         yield Equation(latex=line, number="" if i else number)
     if block.where:

@@ -50,8 +50,8 @@ def symbol(name: str) -> str:
     letters = re.fullmatch(r"([A-Za-z]+)(\d+)", head)
     if letters:
         head, rest = letters[1], [letters[2], *rest]
-    if len(head) == 2 and head[1] == "d":  # yd, xd: what is desired
-        head, rest = head[0], ["d", *rest]
+    if len(head) == 2 and (head[1] == "d" or head[0] in "kK"):  # yd, what is desired; gains, kp
+        head, rest = head[0], [head[1], *rest]
     text = _word(head)
     for mark in marks:
         text = f"{mark}{{{text}}}"
@@ -219,6 +219,9 @@ class LatexWriter:
     def _select(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         if _is_guard(expr):
             return self._written(expr.args[1], index, depth)
+        if extremum := _extremum(expr):
+            parts = (self._held(arg, index, depth, SUM) for arg in reversed(expr.args[1:]))
+            return FUNCTIONS[extremum].latex.format(*parts), ATOM
         rows, rest = [], expr
         while rest.op == "select" and (rest is expr or rest not in self.known):
             condition, yes, rest = rest.args
@@ -330,6 +333,15 @@ def _both(first: str, second: str) -> str:
         if len(low) == len(high) == 3 and low[2] == high[0]:
             return " ".join([*low, *high[1:]])
     return rf"{first} \text{{ and }} {second}"
+
+
+def _extremum(expr: Expr) -> str | None:
+    """Return whether an expression is the larger or the smaller of two, as Python's `max` is."""
+    condition, yes, no = expr.args
+    if condition.op not in ("gt", "ge", "lt", "le") or {yes, no} != {*condition.args}:
+        return None
+    takes_first, above = yes is condition.args[0], condition.op in ("gt", "ge")
+    return "maximum" if takes_first == above else "minimum"
 
 
 def _cases(rows: list[str]) -> str:

@@ -20,10 +20,11 @@ import numpy as np
 from ..annotations import as_annotated
 from ..attributes import described_record
 from ..blocks import Block, supplied_of
+from ..delays.transport import PAST
 from ..diagrams import known_system, overridden
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
-from ..expressions.graph import Expr, Graph, needed
+from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
 from ..sliding.relay import SLIDING
@@ -49,11 +50,12 @@ class BlockEquations:
     where: tuple[str, ...]  # LaTeX: what the symbols of these equations stand for.
     # LaTeX: what the inputs are connected to, where it is not a signal of the same name.
     inputs: tuple[str, ...]
+    missing: str = ""  # Why there are no equations, where other blocks have some.
 
     @property
     def latex(self) -> str:
         """All lines in one aligned environment."""
-        lines = [*self.inputs, *self.equations, *self.where]
+        lines = [*self.inputs, *self.equations, *self.where] or [r"\text{no formula}"]
         body = " \\\\\n".join(line.replace(" = ", " &= ", 1) for line in lines)
         return f"\\begin{{aligned}}\n{body}\n\\end{{aligned}}"
 
@@ -87,7 +89,7 @@ def typeset(
     Raises
     ------
     CompileError
-        If a function is not made of expressions, as for `nlctl.compile`.
+        If no block has formulas: its functions are not made of expressions, as for `nlctl.compile`.
 
     Examples
     --------
@@ -99,22 +101,32 @@ def typeset(
     system = known_system("typeset", system)
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
     read = schedule(overridden(system, params), solve_loops=True)
-    return tuple(_written(read, node, values) for node in read.nodes)
+    blocks = tuple(_written(read, node, values) for node in read.nodes)
+    if blocks and all(block.missing for block in blocks):
+        raise CompileError(f"block '{blocks[0].block}' has no formula: {blocks[0].missing}")
+    return blocks
 
 
 def _written(read: Schedule, node: Node, values: bool) -> BlockEquations:
     try:
         return _block(read, node, values)
     except RecursionError:
-        raise CompileError(
-            f"block '{node.path}' has no formula: its expressions are nested too deeply"
-        ) from None
+        missing = "its expressions are nested too deeply"
+    except Untraceable as error:
+        missing = str(error)
+    return BlockEquations(
+        block=node.path, equations=(), where=(), inputs=tuple(_connections(read, node)),
+        missing=missing,
+    )  # fmt: skip
 
 
 def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     system = node.system
     every = {} if values else slots_of(system, node.path)
-    slots = {name: slot for name, slot in every.items() if slot.kind == "f"}  # others steer
+    written = "f" if isinstance(system, Block) else "fi"  # ours that are integers steer
+    slots = {name: slot for name, slot in every.items() if slot.kind in written}
+    if supplied_of(system) is PAST:
+        return _delayed(read, node, slots)
     inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
     alone = replace(node, state_offset=0, inputs=inputs, sampled=None, direct=feedthrough(system))
     reader = Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
@@ -128,9 +140,9 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
 
     found, names = _beside_a_profiler(traced)
     for call in reader.calls.values():
-        raise CompileError(f"block '{node.path}' has no formula: {call.reason}")
+        raise Untraceable(call.reason)
     leaf = _symbols(system, slots)
-    writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
+    writer = LatexWriter(leaf=leaf, known=_known(system, found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
     form = NEXT_VALUE if next_value else DERIVATIVE
     lines = [
@@ -141,6 +153,23 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
         block=node.path,
         equations=tuple(line for line in lines if not _says_nothing(line)),
         where=tuple(_definitions(writer)),
+        inputs=tuple(_connections(read, node)),
+    )
+
+
+def _delayed(read: Schedule, node: Node, slots: Mapping[str, Slot]) -> BlockEquations:
+    """Return the equations of a transport delay, which are of the past."""
+    system: Any = node.system
+    spec = system.current_spec
+    signals = {*_names(system.output_labels), *_names(system.input_labels)}
+    tau = r"\mathrm{delay}" if symbol("tau") in signals else symbol("tau")
+    tau = tau if "delay" in slots else number_text(spec.delay)
+    earlier = f"t - {tau}" + (r" - \mathrm{varying}\left(t\right)" if spec.varying else "")
+    pairs = zip(_names(system.output_labels), _names(system.input_labels), strict=True)
+    return BlockEquations(
+        block=node.path,
+        equations=tuple(rf"{y}\left(t\right) = {u}\left({earlier}\right)" for y, u in pairs),
+        where=(),
         inputs=tuple(_connections(read, node)),
     )
 
@@ -275,16 +304,21 @@ def _local_names() -> Iterator[dict[Expr, str]]:
 
 
 def _known(
-    found: Mapping[str, Tracer], names: Mapping[Expr, str], leaf: Callable[[str, Index], str]
+    system: System,
+    found: Mapping[str, Tracer],
+    names: Mapping[Expr, str],
+    leaf: Callable[[str, Index], str],
 ) -> dict[Expr, str]:
     """Return names for parts of the equations: the author's, and letters for what is used twice."""
     exprs = needed(expr for array in found.values() for expr, _ in array.pieces())
     plain = ("leaf", "const", "table", "concat", "item", "slice", "lu", "lu_regular")
     taken = {leaf(e.data[0], (e.data[1], 0, "")) for e in exprs if e.op == "leaf" and not e.size}
+    signals = _signals(system, found["y"])
     known: dict[Expr, str] = {}
     for expr in exprs:
         name = symbol(names[expr]) if expr in names else ""
-        if name and expr.op not in plain and expr.kind != "b" and name not in taken:
+        is_free = name not in taken and signals.get(name, expr) is expr
+        if name and is_free and expr.op not in plain and expr.kind != "b":
             known[expr] = name
             taken.add(name)
     uses: dict[Expr, int] = {}
@@ -297,6 +331,19 @@ def _known(
             known[expr] = next(s for k in itertools.count(1) if (s := f"s_{{{k}}}") not in taken)
             taken.add(known[expr])
     return known
+
+
+def _signals(system: System, y: Tracer) -> dict[str, Expr | None]:
+    """Return what the names of signals stand for, also where a function means something else."""
+    signals: dict[str, Expr | None] = dict.fromkeys(
+        _names([*system.state_labels, *system.input_labels, *system.output_labels])
+    )
+    at = 0
+    for expr, size in y.pieces():
+        if size == 1:
+            signals[symbol(system.output_labels[at])] = expr
+        at += size
+    return signals
 
 
 def _definitions(writer: LatexWriter) -> Iterator[str]:

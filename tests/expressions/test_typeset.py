@@ -263,6 +263,46 @@ def test_local_names_are_kept():
     assert made.where == (r"\mathrm{drag} = c x_{2} \left|x_{2}\right|",)
 
 
+def test_a_gain_that_is_written_as_2_has_its_name():
+    """An integer that says how many passes there are is in the equations as a number."""
+    law = ct.nlsys(
+        None, lambda t, x, u, p: sum(p["k"] * u[0] for _ in range(p["n"])),
+        inputs=["e"], outputs=["u"], params={"k": 2, "n": 2}, name="law",
+    )  # fmt: skip
+    (made,) = nlctl.typeset(law)
+    assert made.equations == ("u = k e + k e",)
+    assert nlctl.typeset(law, values=True)[0].equations == ("u = 2 e + 2 e",)
+
+
+def test_the_name_of_a_signal_is_that_signal():
+    """A function calls what it has not yet limited by the name of its output."""
+
+    def rate(t, x, u, p):
+        v = p["k"] * u[0] + x[0]
+        return [u[0] + min(max(v, -1.0), 1.0) - v]
+
+    law = ct.nlsys(
+        rate, lambda t, x, u, p: np.clip(p["k"] * u[0] + x[0], -1, 1), states=["x"], inputs=["e"],
+        outputs=["v"], params={"k": 2}, name="law",
+    )  # fmt: skip
+    (made,) = nlctl.typeset(law)
+    v = "k e + x"
+    limited = rf"\min\left(\max\left({v}, -1\right), 1\right)"
+    assert made.equations == (rf"\dot{{x}} = e + {limited} - k e - x", f"v = {limited}")
+    assert made.where == ()
+
+
+def test_a_delay_is_written_in_time():
+    """y(t) = u(t - tau), with another name for what is called tau already."""
+    for name, delay in (("v", r"\tau"), ("tau", r"\mathrm{delay}")):
+        wire = nlctl.block(nlctl.TransportDelay(delay=0.5, outputs=(name,)), "wire")
+        left = nlctl.expressions.latex.symbol(name)
+        (made,) = nlctl.typeset(wire)
+        assert made.equations == (rf"{left}\left(t\right) = u\left(t - {delay}\right)",)
+        (made,) = nlctl.typeset(wire, values=True)
+        assert made.equations == (rf"{left}\left(t\right) = u\left(t - 0.5\right)",)
+
+
 def test_what_has_no_formula_is_refused():
     """An opaque function is named with its reason."""
     odd = ct.nlsys(
@@ -273,3 +313,10 @@ def test_what_has_no_formula_is_refused():
     )
     with pytest.raises(nlctl.errors.CompileError, match="block 'odd' has no formula"):
         nlctl.typeset(odd)
+    lag = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="lag")
+    loop = ct.interconnect([odd, lag], inputs=["u"], outputs=["y", "x[0]"])
+    without, known = nlctl.typeset(loop)
+    assert (without.block, without.equations, known.missing) == ("odd", (), "")
+    assert "eigenvalues" in without.missing
+    assert known.equations == (r"\dot{x}_{1} = -x_{1} + u", "y = x_{1}")
+    assert without.latex == "\\begin{aligned}\n\\text{no formula}\n\\end{aligned}"

@@ -13,7 +13,7 @@ from nlctl.analysis import figures
 from nlctl.analysis.pages.study.histories import histories
 from nlctl.analysis.pages.study.loop import StudyLoop, loop_of, loop_sections
 from nlctl.analysis.pages.study.report import study_report
-from nlctl.analysis.report import Equation, Figure, Table, render_html
+from nlctl.analysis.report import Equation, Figure, Paragraph, Table, render_html
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, prepare
 from nlctl.analysis.robustness.stl.spec import limits_of_requirements
 from nlctl.analysis.studies import read_study, run
@@ -72,11 +72,21 @@ def test_a_loop_without_formulas_or_blocks_is_shown_as_far_as_it_goes(study):
     def secret(t, x, u, params):
         return np.frombuffer(x.tobytes()) * -1.0
 
-    single = ct.nlsys(secret, None, states=["x"], outputs=["x"], name="single")
+    single = ct.nlsys(secret, None, states=["x"], inputs=0, outputs=["x"], name="single")
     made = {s.key: s for s in loop_sections(StudyLoop(diagram=single, maker="f"), result)}
     assert not [i for i in made["study_loop"].items if isinstance(i, Figure)]
     assert "no formulas of this loop" in made["study_equations"].items[0].text
     assert "study_source" not in made
+    lag = ct.ss(-1, 1, 1, 0, inputs="x", outputs="y", name="lag")
+    single = ct.nlsys(lambda t, x, u, p: [-np.linalg.eigvals(np.diag([1, 2, x[0]])).real.max()],
+                      None, states=["x"], inputs=0, outputs=["x"], name="single")  # fmt: skip
+    both = ct.interconnect([single, lag], inputs=[], inplist=[], outputs=["y"], name="both")
+    items = loop_sections(StudyLoop(diagram=both, maker="f"), result)
+    (section,) = (s for s in items if s.key == "study_equations")
+    texts = [i.text for i in section.items if isinstance(i, Paragraph)]
+    assert texts[1].startswith("Block single")
+    assert "There is no formula of it: " in texts[2]
+    assert [i.latex for i in section.items if isinstance(i, Equation)][-1] == "y = x_{1}"
 
 
 @pytest.mark.slow
