@@ -82,11 +82,14 @@ def _place_in_analysis(name: str) -> str | None:
 
 def with_nearest(name: str, listed: Iterable[str]) -> str:
     """Return what is said of a name that the top does not have."""
-    place = None if name.startswith("_") else _place_in_analysis(name)
+    refused = f"module 'nlctl' has no attribute '{name}'"
+    if name.startswith("_"):  # tools look for many of these
+        return refused
+    place = _place_in_analysis(name)
     if place is not None:
-        return f"module 'nlctl' has no attribute '{name}'; it is {place}.{name}"
+        return f"{refused}; it is {place}.{name}"
     places = {n: f"nlctl.{r}" for n, r in _places().items()} | dict.fromkeys(listed, "nlctl")
     by_small = {known.lower(): known for known in places}
     near = difflib.get_close_matches(name.lower(), by_small, n=1)
     hint = [f"; nearest: {places[by_small[n]]}.{by_small[n]}" for n in near]
-    return f"module 'nlctl' has no attribute '{name}'{''.join(hint)}"
+    return f"{refused}{''.join(hint)}"

@@ -12,7 +12,9 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import llvmlite.binding as llvm
@@ -43,31 +45,46 @@ def ship(path: Path = SHIPPED) -> None:
 def source_files() -> list[str]:
     """Return the files of nlctl that the integrators' bitcode is made of, and by."""
     # Of files elsewhere only what is imported counts, and what that is made of.
-    parts = [*_ROOTS]
+    read, parts = cache(_read), [*_ROOTS]
     for name, part in parts:  # which grows meanwhile
         whole = name.startswith("integrate/")
         parts += [
             other
-            for other in dict.fromkeys(_made_of(HERE / name, "" if whole else part))
+            for other in dict.fromkeys(_made_of(read(HERE / name), "" if whole else part))
             if other not in parts
         ]
     return sorted({name for name, _ in parts})
 
 
-def _made_of(path: Path, part: str) -> Iterator[tuple[str, str]]:
-    """Yield by file and name what a file of nlctl imports, or what one name in it is made of."""
+@dataclass(frozen=True, kw_only=True)
+class _File:
+    """What a file of nlctl imports, and what each of its statements gives a value and reads."""
+
+    place: str
+    imported: Mapping[str, tuple[str, str]]  # by its name here, the file and its name there
+    statements: Sequence[tuple[set[str], set[str]]]
+
+
+def _read(path: Path) -> _File:
+    """Return what stands in a file."""
     body = ast.parse(path.read_text(encoding="utf-8")).body
-    imported = dict(_imports(path, body))
+    return _File(
+        place=Path(os.path.relpath(path, HERE)).as_posix(),
+        imported=dict(_imports(path, body)),
+        statements=[(_names_in(node, ast.Store), _names_in(node, ast.Load)) for node in body],
+    )
+
+
+def _made_of(file: _File, part: str) -> Iterator[tuple[str, str]]:
+    """Yield by file and name what a file of nlctl imports, or what one name in it is made of."""
     if not part:
-        yield from imported.values()
+        yield from file.imported.values()
         return
-    here = Path(os.path.relpath(path, HERE)).as_posix()
-    of_part = [node for node in body if part in _names_in(node, ast.Store)]
-    for name in {part, *(name for node in of_part for name in _names_in(node, ast.Load))}:
-        if name in imported:
-            yield imported[name]
-        elif any(name in _names_in(node, ast.Store) for node in body):
-            yield here, name
+    for name in {part}.union(*(reads for gives, reads in file.statements if part in gives)):
+        if name in file.imported:
+            yield file.imported[name]
+        elif any(name in gives for gives, _ in file.statements):
+            yield file.place, name
 
 
 def _names_in(node: ast.AST, kind: type[ast.expr_context]) -> set[str]:

@@ -85,8 +85,8 @@ UNFIT = {
     "no header": SHIPPED.read_bytes().partition(b"\n")[2],
     "another header": b"[]\n" + SHIPPED.read_bytes().partition(b"\n")[2],
     "other sources": changed(sources=hashlib.sha256(b"").hexdigest()),
-    "a file less": changed(files=source_files()[1:]),
-    "a file that is not there": changed(files=["_gone.py", *source_files()]),
+    "a file less": changed(files=header()["files"][1:]),
+    "a file that is not there": changed(files=["_gone.py", *header()["files"]]),
     "newer LLVM": changed(llvm=[llvm.llvm_version_info[0] + 1, 0, 0]),
 }
 
