@@ -13,7 +13,8 @@ difference (``tests/diagrams/test_copied_parameters.py``).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -21,6 +22,8 @@ import control as ct
 from .errors import AmbiguousNameError, ParameterError, UnknownNameError
 from .wording import counted, nearest
 
+_PARTS = re.compile(r"((?:.*\.)?[^.\[\]]*)(?:\[.*)?", re.DOTALL)  # a name, and what follows it
+_ELEMENT = re.compile(r"\[\d+(?:, ?\d+)*\]|(?:\[\d+\])+")  # as NumPy has it, and as lists have it
 _LISTED = 24  # names that a message lists; it says how many more there are
 
 
@@ -52,8 +55,43 @@ def check_known(kind: str, name: str, known: Collection[str], where: str = "") -
 def base_name(name: str) -> str:
     """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``."""
     # Block names may hold brackets as well (python-control's generic ``sys[0]``); they stay.
-    path, dot, last = name.rpartition(".")
-    return path + dot + last.partition("[")[0]
+    parts = _PARTS.fullmatch(name) if "[" in name else None
+    return name if parts is None else parts[1]
+
+
+def element_name(base: str, index: Sequence[int]) -> str:
+    """Return the name of an element of a parameter: ``"c.W[0, 1]"``, and itself of a number."""
+    return f"{base}[{', '.join(map(str, index))}]" if index else base
+
+
+def is_element(name: object) -> bool:
+    """Whether a name is that of an element, whether there is one or not."""
+    return isinstance(name, str) and "[" in name and name != base_name(name)
+
+
+def in_one_spelling(name: str) -> str:
+    """Return the name of an element as `element_name` spells it: ``"c.W[0][1]"`` may be given."""
+    base = base_name(name)
+    is_element = _ELEMENT.fullmatch(name, len(base))
+    return element_name(base, _numbers(name[len(base) :])) if is_element else name
+
+
+def element_index(name: str, shape: Sequence[int]) -> tuple[int, ...]:
+    """Return which element of a parameter of some shape is meant by a name."""
+    base = base_name(name)
+    index = _numbers(name[len(base) :]) if _ELEMENT.fullmatch(name, len(base)) else ()
+    wrong = name != base and not index
+    if wrong or len(index) != len(shape) or any(i >= n for i, n in zip(index, shape, strict=True)):
+        example = element_name(base, [0] * len(shape))
+        raise ParameterError(
+            f"'{name}' is not one number of '{base}', whose shape is {tuple(shape)}: name one, "
+            f"such as '{example}'"
+        )
+    return index
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(map(int, re.findall(r"\d+", text)))
 
 
 def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[str] = ()) -> str:
@@ -135,8 +173,8 @@ class Parameters(dict[str, Any]):
     def __or__(self, other: Mapping[str, Any]) -> Parameters:  # type: ignore[override]
         new = self.copy()
         if self.complete and not isinstance(other, Parameters):
-            for name, value in other.items():  # a user's: a diagram's parameters, some changed
-                new[name] = value
+            for name in sorted(other, key=is_element):  # a diagram's parameters, some changed
+                new[name] = other[name]
             return new
         new.scope, new.block, new.complete = None, None, False
         new._absorb(other)
@@ -178,9 +216,10 @@ class Parameters(dict[str, Any]):
         if isinstance(other, Parameters):
             self._inherit(other)
             return
-        for name, value in {**(other or {}), **kwargs}.items():
+        given = {**(other or {}), **kwargs}
+        for name in sorted(given, key=is_element):  # behind what they are elements of
             if not self._is_elsewhere(name):
-                self._override(name, value)
+                self._override(name, given[name])
 
     def _inherit(self, outer: Parameters) -> None:
         """Take over the values that the enclosing diagram has for these parameters."""

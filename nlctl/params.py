@@ -20,7 +20,7 @@ import numpy as np
 from .annotations import as_numbers, reporting
 from .attributes import entries_by_field
 from .errors import ParameterError, UnknownKeywordError
-from .names import unknown
+from .names import base_name, element_index, unknown
 from .pickles import state_of, with_state
 
 Floats = tuple[float, ...]
@@ -417,20 +417,12 @@ def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
 
 
 def _replace_element(spec: Any, key: str, value: object) -> Any:
-    name = key.partition("[")[0]
+    name, number = base_name(key), as_numbers(value)
     array = np.array(getattr(spec, name), dtype=float)
-    inside = re.fullmatch(r"\[(\d+(?:, ?\d+)*)\]", key.removeprefix(name))
-    number = as_numbers(value)
-    try:
-        index = tuple(int(part) for part in inside[1].split(",")) if inside else None
-        if index is None or len(index) != array.ndim or number is None or number.ndim:
-            raise IndexError
-        array[index] = number
-    except IndexError:
-        raise ParameterError(
-            f"{type(spec).__name__} has {name} of shape {array.shape}; "
-            f"'{key}' = {value!r} is not an element of it"
-        ) from None
+    index = element_index(key, array.shape)
+    if number is None or number.ndim:
+        raise ParameterError(f"{type(spec).__name__} needs a number for {key}, got {value!r}")
+    array[index] = number
     return dataclasses.replace(spec, **{name: array})
 
 

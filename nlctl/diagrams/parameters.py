@@ -17,7 +17,7 @@ from ..upstream.control_internals import StandIn, current_parameters, set_parame
 from ..upstream.systems import System
 from .addresses import divided
 from .places import known_system, leaves
-from .third_party import apart, declared_keys, is_third_party, set_key
+from .third_party import apart, declared_keys, is_third_party, set_keys
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,8 +38,8 @@ def override(system: ct.NonlinearIOSystem, params: Mapping[str, Any] | None) -> 
     set_parameters(system, parts.given)
     for leaf_block in blocks:
         if "nlctl_overrides" not in vars(leaf_block):  # not a run's own
-            for name, value in parts.alone.get(id(leaf_block), {}).items():
-                set_key(current_parameters(leaf_block), name, value)
+            alone = parts.alone.get(id(leaf_block), {})
+            set_keys(current_parameters(leaf_block), alone, str(leaf_block.name))
     return parts.given
 
 

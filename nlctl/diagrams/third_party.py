@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 import functools
 import operator
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -20,7 +19,8 @@ import control as ct
 import numpy as np
 
 from ..blocks import Block, sampling_of, within
-from ..names import Parameters, base_name
+from ..errors import ParameterError
+from ..names import Parameters, base_name, element_index, is_element
 from ..upstream.control_internals import (
     RESOLVED,
     OwnParameters,
@@ -74,8 +74,9 @@ class Named(_TakesADict):
     def _taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read: its own values, overridden."""
         values, prefix = dict(self.nlctl_own), f"{self.name}."
-        for name, value in [*params.items(), *vars(self).get("nlctl_overrides", {}).items()]:
-            set_key(values, str(name).removeprefix(prefix), value)
+        for given in (params, vars(self).get("nlctl_overrides", {})):
+            local = {str(name).removeprefix(prefix): value for name, value in given.items()}
+            set_keys(values, local, self.name)
         return values
 
 
@@ -85,20 +86,26 @@ class Overridden(_TakesADict):
     def _taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read."""
         values = {**self.params, **params}
-        for name, value in self.nlctl_overrides.items():
-            set_key(values, name, value)
+        set_keys(values, self.nlctl_overrides, self.name)
         return values
 
 
-def set_key(values: dict[str, Any], name: str, value: object) -> None:
-    """Set a parameter, or an element of one, in a dict."""
+def set_keys(values: dict[str, Any], given: Mapping[str, Any], block: str) -> None:
+    """Set parameters of a block in a dict, elements behind what they are elements of."""
+    for name in sorted(given, key=is_element):
+        _set_key(values, name, given[name], block)
+
+
+def _set_key(values: dict[str, Any], name: str, value: object, block: str) -> None:
     base = base_name(name)
     if base == name or name in values or base not in values:
         values[name] = value
         return
     old = values[base]
+    if np.asarray(value).ndim:
+        raise ParameterError(f"'{block}.{name}' needs one number, got {value!r}")
     array = np.array(old, dtype=np.result_type(np.asarray(old), np.asarray(value)))
-    array[tuple(int(k) for k in re.findall(r"\d+", name[len(base) :]))] = value
+    array[element_index(f"{block}.{name}", array.shape)] = value
     values[base] = array if isinstance(old, np.ndarray) else type(old)(array.tolist())
 
 

@@ -17,7 +17,7 @@ from ..annotations import as_annotated
 from ..attributes import with_parameters_of
 from ..diagrams import apart, not_a_system, override
 from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
-from ..names import unknown
+from ..names import in_one_spelling, unknown
 from ..responses.arguments import checked_params
 from ..responses.watched import Watched
 from ..upstream.control_internals import StandIn, is_system, state_space
@@ -290,7 +290,7 @@ class Compiled(Reading, StandIn):
         jacobians.tell_of_differences(self, self.parameter_vector(params))  # blocks have these
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))
-        for k, name in enumerate(parameters):
+        for k, name in enumerate(map(in_one_spelling, parameters)):
             if name not in places:
                 raise unknown("parameter", name, places, f"of '{self.system.name}' that is a float")
             jacobians.check_enters_alone(places[name][1], name)

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import ParameterError
+from ..names import base_name, element_name
 from .diagram.nodes import Node
 from .reading import Reading
 
@@ -26,8 +27,8 @@ def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
     found = {}
     for i, own in reading.program.layout.items():
         for slot in own.values():
-            for k in range(slot.size if slot.kind == "f" else 0):
-                name = f"{slot.name}[{k}]" if slot.shape else slot.name
+            for k, index in enumerate(np.ndindex(slot.shape) if slot.kind == "f" else ()):
+                name = element_name(slot.name, index)
                 found[name] = slot.offset + k, reading.schedule.holders[i]
     return found
 
@@ -35,7 +36,7 @@ def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
 def with_floats(reading: _Read, names: Collection[str]) -> _Read:
     """Return a diagram in which parameters by these names, short ones too, are floats."""
     # the audit of a run compares the equations with functions that are handed the integers
-    ends = tuple(f".{name.partition('[')[0]}" for name in names)
+    ends = tuple(f".{base_name(name)}" for name in names)
     return _changed(reading, [name for name in reading.integers if f".{name}".endswith(ends)])
 
 

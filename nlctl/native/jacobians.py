@@ -19,6 +19,7 @@ from ..errors import CompileError, InexactWarning, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
+from ..names import base_name, element_index
 from ..params import as_numbers, declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
@@ -235,14 +236,12 @@ def _sampled_map(
 def check_enters_alone(node: Node, name: str) -> None:
     """Refuse a parameter that numbers follow from: these are constants to the equations."""
     spec: Any = node.system.current_spec if isinstance(node.system, Block) else None
-    field, _, place = name.removeprefix(f"{node.path}.").partition("[")
+    key = name.removeprefix(f"{node.path}.")
+    field = base_name(key)
     if not hasattr(spec, "derived") or field not in declared_params(spec):
         return
     values = np.asarray(getattr(spec, field), dtype=float)
-    flat = int(place.removesuffix("]") or 0)
-    value, key = float(values.ravel()[flat]), field
-    if values.ndim:
-        key += f"[{', '.join(map(str, np.unravel_index(flat, values.shape)))}]"
+    value = float(values[element_index(key, values.shape)])
     now = equation_arguments(spec)._asdict()
     for moved in (value + STEP * max(abs(value), 1.0), value - STEP * max(abs(value), 1.0)):
         try:

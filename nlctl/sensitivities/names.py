@@ -12,7 +12,7 @@ from ..blocks import Block, supplied_of
 from ..delays.transport import PAST
 from ..diagrams import state_names
 from ..errors import CompileError, ParameterError
-from ..names import find_name, unknown
+from ..names import base_name, find_name, in_one_spelling, unknown
 from ..native import Compiled
 from ..native.diagram.nodes import Node
 from ..native.diagram.wiring import Signal as Output
@@ -82,7 +82,7 @@ def varied_quantities(compiled: Compiled, names: Sequence[str]) -> list[VariedQu
         if name not in parameters and name in states:
             raise unknown("parameter", name, [*parameters, f"{name}{_AT_START}"])
         _check_float(compiled, name)
-        full = name if name in parameters else find_name("parameter", name, parameters)
+        full = find_name("parameter", in_one_spelling(name), parameters)
         place, owner = parameters[full]
         _check_moves(compiled, owner, full)
         check_enters_alone(owner, full)
@@ -139,7 +139,7 @@ def declared_bounds(owner: Node, name: str) -> tuple[float, float]:
     """Return between what a block declares that a parameter lies."""
     if not isinstance(owner.system, Block):
         return -np.inf, np.inf
-    field = name.removeprefix(f"{owner.path}.").partition("[")[0]
+    field = base_name(name.removeprefix(f"{owner.path}."))
     declared = declared_params(owner.system.spec).get(field)
     if declared is None:
         return -np.inf, np.inf

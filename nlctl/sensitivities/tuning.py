@@ -15,7 +15,7 @@ from ..annotations import as_annotated
 from ..arguments import number, tolerances
 from ..diagrams import state_names
 from ..errors import ParameterError
-from ..names import find_name
+from ..names import find_name, in_one_spelling
 from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
@@ -388,7 +388,7 @@ def _row(
     diagram: Compiled, name: str, value: object, present: Mapping[str, float]
 ) -> tuple[str, float, float, float]:
     """Return the full name of a gain, where its search starts, and its bounds."""
-    full = name if name in present else find_name("parameter", name, present)
+    full = find_name("parameter", in_one_spelling(name), present)
     row = as_numbers(value)
     if row is None or row.shape not in ((2,), (3,)):
         raise ParameterError(f"'{name}' needs (low, high) or (start, low, high), got {value!r}")

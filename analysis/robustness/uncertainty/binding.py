@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -17,7 +16,7 @@ from nlctl.arguments import a_function, of_type
 from nlctl.blocks import Block, within
 from nlctl.diagrams import all_parameter_rows, initial_state, leaves, samplings, state_names
 from nlctl.errors import ParameterError, UsageError
-from nlctl.names import Parameters, base_name, find_name, unknown
+from nlctl.names import Parameters, base_name, element_index, element_name, find_name, unknown
 from nlctl.native import Compiled
 from nlctl.params import with_overrides
 from nlctl.upstream.control_internals import is_system
@@ -98,11 +97,11 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
                 f"scipy.stats.randint(0, 10), got {quantity.law_text}"
             )
     if suffix:
-        value = np.asarray(value)[tuple(int(k) for k in re.findall(r"\d+", suffix))]
+        value = np.asarray(value)[element_index(full + suffix, np.shape(value))]
     if np.ndim(value):
         raise SpaceError(
             f"'{full}' has shape {np.shape(value)}: address one element of it, "
-            f"'{full}[{', '.join('0' * np.ndim(value))}]'"
+            f"'{element_name(full, [0] * np.ndim(value))}'"
         )
     return _filled(quantity, full + suffix, float(value), unit)
 

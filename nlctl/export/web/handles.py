@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -13,7 +12,7 @@ from ...attributes import described_record
 from ...diagrams import state_names
 from ...diagrams.parameters import declared_rules
 from ...errors import ParameterError, UsageError
-from ...names import unknown
+from ...names import base_name, element_index, unknown
 from ...native import Compiled
 from ...native.diagram.parameters import Slot
 from ...native.diagram.program import slots_of_clocks
@@ -211,18 +210,13 @@ class _Reader:
 
     def _place(self, name: str) -> tuple[int, Slot]:
         """Return where a number lies in the vector of parameters."""
-        base, indices = re.fullmatch(r"(.*?)((?:\[\d+\])*)", name).groups()  # type: ignore[union-attr]
+        base = base_name(name)
         if base not in self.slots:
             every = [*self.slots, *self.states, *self.inputs, *self.faults]
             raise unknown("parameter, initial state, input or fault", name, every,
                           f"of '{self.system.name}'")  # fmt: skip
         slot = self.slots[base]
-        index = tuple(int(i) for i in re.findall(r"\d+", indices))
-        if len(index) != len(slot.shape) or any(
-            i >= n for i, n in zip(index, slot.shape, strict=True)
-        ):
-            example = base + "".join("[0]" for _ in slot.shape)
-            raise ParameterError(f"'{name}' is not one number: name one, such as '{example}'")
+        index = element_index(name, slot.shape)
         return slot.offset + (int(np.ravel_multi_index(index, slot.shape)) if index else 0), slot
 
     def _check_moves(
