@@ -16,30 +16,11 @@ from nlctl.errors import UsageError
 from nlctl.wording import counted
 
 from ..papers import paper_key
+from . import studies, written_page
 from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun
 from .memory import TO_BEGIN, check_memory
 from .own_page import compose_page, is_loop_name, is_paper_name, page_folder
 from .printing import error_line, in_json, notify, say
-from .studies import (
-    Json,
-    Junit,
-    Trust,
-    check_junit,
-    check_run_path,
-    check_study_path,
-    exit_code,
-    exit_codes,
-    run_folder,
-    write_claims,
-)
-from .written_page import (
-    PageOptions,
-    WrittenPage,
-    check_report_options,
-    finish_report,
-    show_page,
-    stamped,
-)
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -95,7 +76,7 @@ def report(
     ] = None,
     open_: Open = False,
     pdf: Pdf = False,
-    junit: Junit = None,
+    junit: studies.Junit = None,
     interactive: Interactive = False,
     live: Annotated[
         bool,
@@ -123,13 +104,13 @@ def report(
     ] = "",
     date: Annotated[str, typer.Option(help="The same for a date.")] = "",
     force: Force = False,
-    trust: Trust = False,
+    trust: studies.Trust = False,
 ) -> None:
     """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails.
 
     Rows of a study are drawn from its loop: the code that the study names is run.
     """
-    options = PageOptions(
+    options = written_page.PageOptions(
         out=out,
         threads=jobs or None,
         pdf=pdf,
@@ -139,10 +120,10 @@ def report(
         live=move or live,
         stamp={k: v for k, v in (("revision", revision), ("date", date)) if v},
     )
-    with exit_codes(json=False):
+    with studies.exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
         _check_loop_options(is_loop, set_, input_, until, step, require)
-        check_junit(junit)
+        studies.check_junit(junit)
         if what is None or is_paper_name(str(what)):
             if move:
                 raise UsageError(
@@ -166,8 +147,8 @@ def report(
         from ..report.typography import plain_text
 
         say(plain_text(written.verdict))
-        finish_report(written.page, pdf=pdf, open_=open_)
-        write_claims(junit, written.title, written.claims)
+        written_page.finish_report(written.page, pdf=pdf, open_=open_)
+        studies.write_claims(junit, written.title, written.claims)
         if written.code:
             raise typer.Exit(written.code)
 
@@ -181,23 +162,27 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
         )
 
 
-def _loop(run: AskedRun, required: Sequence[str], options: PageOptions) -> WrittenPage:
+def _loop(
+    run: AskedRun, required: Sequence[str], options: written_page.PageOptions
+) -> written_page.WrittenPage:
     """Report a loop of the user's."""
     folder = options.out or page_folder(run.loop)
-    check_report_options(folder, options)
+    written_page.check_report_options(folder, options)
     from ..report.render import write_report
 
-    composed = stamped(compose_page(run, options.live, required), options)
+    composed = written_page.stamped(compose_page(run, options.live, required), options)
     page = write_report(composed, folder, interactive=options.interactive, force=options.force)
     code = int(not all(claim.holds for claim in composed.claims))
     return _written(composed, page, code)
 
 
-def _paper(name: str, out: Path, options: PageOptions, *, far: bool) -> WrittenPage:
+def _paper(
+    name: str, out: Path, options: written_page.PageOptions, *, far: bool
+) -> written_page.WrittenPage:
     """Reproduce a paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead, name)  # first of all: imports there and here take seconds
-        check_report_options(out, options)
+        written_page.check_report_options(out, options)
         from ..papers import named_paper
         from ..report.render import write_report
         from ..reproductions.page import compose_paper
@@ -219,7 +204,7 @@ def _paper(name: str, out: Path, options: PageOptions, *, far: bool) -> WrittenP
             report = with_parts_live(paper, report)
         words = " --far" * far + " --interactive" * options.interactive
         words += " --live" * bool(options.live)
-        report = stamped(replace(report, command=report.command + words), options)
+        report = written_page.stamped(replace(report, command=report.command + words), options)
         page = write_report(
             report, out, interactive=options.interactive, force=options.force, pool=beside,
             drawn=composed.drawn,
@@ -227,8 +212,8 @@ def _paper(name: str, out: Path, options: PageOptions, *, far: bool) -> WrittenP
     return _written(report, page, int(not composed.passed))
 
 
-def _written(report: Report, page: Path, code: int) -> WrittenPage:
-    return WrittenPage(report.verdict, report.title, report.claims, page, code)
+def _written(report: Report, page: Path, code: int) -> written_page.WrittenPage:
+    return written_page.WrittenPage(report.verdict, report.title, report.claims, page, code)
 
 
 def _import_ahead(name: str) -> None:
@@ -253,7 +238,7 @@ def _other_process() -> Iterator[Executor]:
             raise
 
 
-def _study(study: Path, options: PageOptions) -> WrittenPage:
+def _study(study: Path, options: written_page.PageOptions) -> written_page.WrittenPage:
     """Report a study."""
     check_memory(TO_BEGIN)
     from ..pages.study.claims import claims
@@ -261,16 +246,18 @@ def _study(study: Path, options: PageOptions) -> WrittenPage:
 
     is_file = study.suffix == ".toml"
     if is_file:
-        check_study_path(study)
+        studies.check_study_path(study)
     elif study.is_file():
-        check_run_path(study)
-    kept = run_folder(study) if is_file else study
-    check_report_options(options.out or kept, options)
+        studies.check_run_path(study)
+    kept = studies.run_folder(study) if is_file else study
+    written_page.check_report_options(options.out or kept, options)
     page, result = report_study(study, options)
     if is_file and not result.complete:
         error_line("nlctl: incomplete; the same command resumes")
     title = result.study.study.title
-    return WrittenPage(result.verdict, title, claims(result), page, exit_code(result))
+    return written_page.WrittenPage(
+        result.verdict, title, claims(result), page, studies.exit_code(result)
+    )
 
 
 def compare_command(
@@ -283,7 +270,7 @@ def compare_command(
     open_: Open = False,
     pdf: Pdf = False,
     force: Force = False,
-    json: Json = False,
+    json: studies.Json = False,
 ) -> None:
     """Say what differs between two reports or two runs of studies; exit 1 if anything does.
 
@@ -298,7 +285,7 @@ def compare_command(
         comparison = compose_comparison(first, second, out, rtol)
         page = write_report(comparison, out, force=force)
         with redirect_stdout(sys.stderr):  # what differs, alone, is on stdout
-            finish_report(page, pdf=pdf, open_=open_)
+            written_page.finish_report(page, pdf=pdf, open_=open_)
     if not same:
         raise typer.Exit(1)
 
@@ -306,7 +293,7 @@ def compare_command(
 def _check_page_options(out: Path | None, *, pdf: bool, open_: bool, force: bool) -> None:
     """Refuse what is set of a page where none is made, or where it could not be written."""
     if out is not None:
-        check_report_options(out, PageOptions(pdf=pdf, force=force))
+        written_page.check_report_options(out, written_page.PageOptions(pdf=pdf, force=force))
     elif pdf or open_ or force:
         raise UsageError("--pdf, --open and --force are of a page: say where, with --out DIR")
 
@@ -328,7 +315,7 @@ def write_gallery_of(
     check_writable(folder)
     page = write_gallery(folder, force=force, check=check_page, draw=trend_figure)
     say(page)
-    show_page(page, open_)
+    written_page.show_page(page, open_)
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:

@@ -132,17 +132,16 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
         return [Line(key=k, statement="bounds of k G", status="undecided") for k in names]
     moved = drift(run.signals, given.N)
     margin = drift_margin(moved, x.V[0], given.alpha_0, l_min=low, l_max=high, V=x.V)
-    holds = margin.least >= -1e-6 * float(np.max(x.V))
     c = Line(
-        key="(c)",
-        statement="V <= V(0) + alpha_0 t + zeta - zeta(0) + l+ E+ - l- E-",
-        status="checked" if holds else "violated",
+        key=margin.equation,
+        statement=margin.statement,
+        status="checked" if margin.holds else "violated",
         least=margin.least,
-        time=margin.when,
-        state=run.signals.at(margin.when),
+        time=margin.at,
+        state=run.signals.at(margin.at),
         evidence=f"E+ = {moved.gained[-1]:.5g}, E- = {moved.lost[-1]:.5g}, "
         f"k G in [{low:.4g}, {high:.4g}]",
-        follows="" if holds else "k G left its bounds, or N zeta' is not r u.",
+        follows="" if margin.holds else "k G left its bounds, or N zeta' is not r u.",
     )
     try:
         safe = safe_horizon(
@@ -157,9 +156,9 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
     b = Line(
         key="(b)",
         statement=SAFE,
-        status=status if margin.monotone else "not applicable",
-        evidence=evidence + ("" if margin.monotone else "; here zeta falls and k G varies"),
-        follows="k G left its bounds." if margin.monotone and crossed else "",
+        status=status if moved.monotone else "not applicable",
+        evidence=evidence + ("" if moved.monotone else "; here zeta falls and k G varies"),
+        follows="k G left its bounds." if moved.monotone and crossed else "",
     )
     return [c, b]
 

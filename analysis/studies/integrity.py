@@ -11,14 +11,7 @@ from nlctl.errors import UsageError
 from nlctl.wording import counted
 
 from .folder import read_through
-from .intact.contents import (
-    CONTENTS,
-    PAGE_FILES,
-    is_part,
-    page_problems,
-    problems_in,
-    sealed_record,
-)
+from .intact import contents
 
 
 @described_record(made_by="verify")
@@ -98,12 +91,12 @@ def verify(folder: str | Path) -> Integrity:
     (False, ["probability/finding.json' is missing"])
     """
     folder = Path(folder)
-    content = sealed_record(folder)
-    expected = {CONTENTS, *content["files"], *PAGE_FILES}
-    every = (path for path in folder.rglob("*") if is_part(path))
+    content = contents.sealed_record(folder)
+    expected = {contents.CONTENTS, *content["files"], *contents.PAGE_FILES}
+    every = (path for path in folder.rglob("*") if contents.is_part(path))
     names = (path.relative_to(folder).as_posix() for path in every)
-    in_files = [*problems_in(folder, content)] or [*_contradictions(folder)]
-    problems = tuple(dict.fromkeys([*in_files, *page_problems(folder, content)]))
+    in_files = [*contents.problems_in(folder, content)] or [*_contradictions(folder)]
+    problems = tuple(dict.fromkeys([*in_files, *contents.page_problems(folder, content)]))
     listed = " ".join(problems)
     return Integrity(
         folder=folder,

@@ -173,11 +173,11 @@ class TestWhatLemma1Leaves:
         """V = r^2/2: V' = N zeta' + r d <= N zeta' + zeta' + d^2/(4 beta), zeta' = beta r^2."""
         run = drift(part(crossing, 150.0), tame)
         margin = drift_margin(run, 0.0, D**2 / (4 * BETA), l_min=1.0, l_max=1.0)
-        assert margin.monotone
+        assert run.monotone
         assert margin.least >= -1e-6
         broken = drift_margin(run, 0.0, 1e-3, l_min=1.0, l_max=1.0)  # a disturbance understated
         assert broken.least < 0
-        assert run.time[0] < broken.when <= run.time[-1]
+        assert run.time[0] < broken.at <= run.time[-1]
 
     def test_the_horizon_is_safe(self):
         """The burst of the crossing loop comes after T, which (b) gives in closed form."""
@@ -212,7 +212,7 @@ class TestWhatLemma1Leaves:
         assert 0 < V.min() <= V.max() < 2 * c1
         run = drift(response(time, zeta, np.sqrt(2 * V), 0 * time))
         margin = drift_margin(run, c1, c1 * c2, l_min=1.0, l_max=1.0, V=V)
-        assert margin.monotone
+        assert run.monotone
         assert margin.least >= -1e-6
         horizon = safe_horizon(c1, c1 * c2, l_min=1.0, l_max=1.0, zeta_0=0.0)
         assert 0 < horizon.time < passes
@@ -230,7 +230,7 @@ class TestWhatLemma1Leaves:
         V = 2 * run.gained - run.lost + zeta
         assert V[-1] == pytest.approx(loop, rel=1e-6)
         np.testing.assert_allclose(
-            drift_margin(run, 0.0, 0.0, l_min=1.0, l_max=2.0, V=V).values, 0, atol=1e-12
+            drift_margin(run, 0.0, 0.0, l_min=1.0, l_max=2.0, V=V).margin, 0, atol=1e-12
         )
 
     @each_row(("l_min", "l_max"), [(0.0, 1.0), (2.0, 1.0), (np.nan, 1.0), (-1.0, 1.0)])

@@ -401,11 +401,13 @@ def loop_parts(
     loop: ct.InterconnectedSystem, roles: Roles, start: Mapping[str, float] | None = None
 ) -> Parts:
     """Return the parts of a loop that was read, with the parameters that its blocks have now."""
-    specs = {part: roles.spec(part) for part in roles.places}
+    specs = {part: roles.spec(part) for part in PIECES if part != "reference"}
+    if not isinstance(specs["weights"], AdaptiveWeights):
+        specs |= {"basis": None, "weights": None}  # without a network
     x0 = initial_state(loop, start)
     states = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
     _, outputs = values_now(loop, (0.0, x0, np.zeros(loop.ninputs or 0)))
-    weights = specs["weights"] if isinstance(specs["weights"], AdaptiveWeights) else None
+    weights = specs["weights"]
     gains = Gains(
         beta=specs["law"].beta,
         Gamma=weights.Gamma if weights else 1.0,
@@ -418,14 +420,4 @@ def loop_parts(
         W_hat_0=tuple(map(float, states["weights"])) if weights else (),
         b=specs["law"].b if isinstance(specs["law"], DAMPED) else 0.0,
     )
-    return Parts(
-        plant=specs["plant"],
-        actuator=specs["actuator"],
-        filtered_error=specs["filtered_error"],
-        robust=specs["robust"],
-        law=specs["law"],
-        basis=specs.get("basis") if weights else None,
-        weights=weights,
-        roles=roles,
-        gains=gains,
-    )
+    return Parts(**specs, roles=roles, gains=gains)

@@ -25,7 +25,7 @@ from nlctl.arguments import number
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 
-from ..loop.signals import Signals, signals_of
+from ..loop.signals import INTEGRATED, Margin, Signals, inequality, signals_of
 from .property import GainFunction, antiderivative, lobes
 
 
@@ -45,6 +45,14 @@ class Drift:
     # Largest distance between `phi` and the integral of r u (trapezoidal rule), over the largest
     # |phi|: how well the samples obey N(zeta) zeta' = r u.
     mismatch: float
+
+    @property
+    def monotone(self) -> bool:
+        """Whether zeta never falls by more than rounding."""
+        # Then V >= 0 alone makes the inequality at the top of this module a bound on the time
+        # that a lobe lasts.
+        fall = np.diff(self.zeta).min(initial=0.0)
+        return bool(fall >= -1e-12 * np.max(np.abs(self.zeta)))
 
 
 def finite_signal(signals: Signals, name: str) -> np.ndarray:
@@ -80,8 +88,9 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     >>> from nlctl.analysis.lyapunov import drift, drift_margin
     >>> loop = nlctl.paper.example_1()
     >>> run = drift(nlctl.input_output_response(loop, np.linspace(0, 1, 101)))
-    >>> print(run.mismatch < 0.01, drift_margin(run, 1.0, 10.0, l_min=0.7, l_max=1.3).monotone)
-    True False
+    >>> margin = drift_margin(run, 1.0, 10.0, l_min=0.7, l_max=1.3)
+    >>> print(run.mismatch < 0.01, run.monotone, margin.holds)
+    True False True
     """
     if not isinstance(response, Signals) and not hasattr(response, "output_labels"):
         raise ParameterError(
@@ -105,27 +114,6 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     )
 
 
-@described_record
-class DriftMargin:
-    """Margin of the inequality at the top of this module; it holds where it is >= 0."""
-
-    time: np.ndarray  # (m,)
-    values: np.ndarray
-    # Whether zeta never falls by more than rounding: then V >= 0 alone makes the inequality a bound
-    # on the time that a lobe lasts.
-    monotone: bool
-
-    @property
-    def least(self) -> float:
-        """Least margin."""
-        return float(np.min(self.values))
-
-    @property
-    def when(self) -> float:
-        """Time (s) of the least margin."""
-        return float(self.time[int(np.argmin(self.values))])
-
-
 @as_annotated
 def drift_margin(
     run: Drift,
@@ -135,7 +123,7 @@ def drift_margin(
     l_min: float,
     l_max: float,
     V: np.ndarray | None = None,
-) -> DriftMargin:
+) -> Margin:
     """Return the margin of V(t) <= V(0) + alpha_0 t + zeta - zeta(0) + l_max E_+ - l_min E_-.
 
     Parameters
@@ -151,8 +139,8 @@ def drift_margin(
 
     Returns
     -------
-    DriftMargin
-        Right side less left side at each sample, and whether zeta never falls.
+    Margin
+        Right side less left side at each sample.
 
     Raises
     ------
@@ -167,10 +155,14 @@ def drift_margin(
     V = run.r**2 / 2 if V is None else np.asarray(V)
     travelled = run.zeta - run.zeta[0]
     bound = V_0 + alpha_0 * (run.time - run.time[0]) + travelled
-    values = bound + l_max * run.gained - l_min * run.lost - V
-    fall = np.diff(run.zeta).min(initial=0.0)
-    return DriftMargin(
-        time=run.time, values=values, monotone=bool(fall >= -1e-12 * np.max(np.abs(run.zeta)))
+    return inequality(
+        "(c)",
+        "V <= V(0) + alpha_0 t + zeta - zeta(0) + l+ E+ - l- E-",
+        run.time,
+        V,
+        bound + l_max * run.gained - l_min * run.lost,
+        scale=float(np.max(V)),
+        tolerance=INTEGRATED,
     )
 
 

@@ -28,14 +28,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from types import CellType, CodeType, FunctionType, ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, Literal
 from urllib.parse import unquote, urlparse
 
 import control as ct
 
 from nlctl.errors import ParameterError
+from nlctl.expressions.source import codes_in
 from nlctl.host.former_name import present_name
+from nlctl.native.purity.captured import in_cell
 
 from ..file.errors import KeyPath, Problem
 from ..file.schema import Study
@@ -378,25 +380,12 @@ def _uses_makers(member: object, seen: set[int]) -> bool:
     if not isinstance(member, FunctionType):
         module = type(member).__module__.partition(".")[0]
         return module not in sys.stdlib_module_names and _uses_makers(type(member), seen)
-    names = _names(member.__code__)
+    names = {name for code in codes_in(member.__code__) for name in code.co_names}
     reached = [member.__globals__[name] for name in names if name in member.__globals__]
-    reached += [cell.cell_contents for cell in member.__closure__ or () if _is_filled(cell)]
+    reached += [held for cell in member.__closure__ or () if (held := in_cell(cell)) is not None]
     imported = {name.partition(".")[0] for name in names}  # inside of the function
     return bool(imported & set(MAKERS)) or any(_uses_makers(part, seen) for part in reached)
 
 
 def _is_maker(module: str) -> bool:
     return module.partition(".")[0] in MAKERS and not _is_in(module, [_ABOUT_LOOPS])
-
-
-def _names(code: CodeType) -> set[str]:
-    """Return the names that a function reads, and those inside of it."""
-    inner = (part for part in code.co_consts if isinstance(part, CodeType))
-    return set(code.co_names).union(*map(_names, inner))
-
-
-def _is_filled(cell: CellType) -> bool:
-    try:
-        return cell.cell_contents is not None
-    except ValueError:
-        return False
