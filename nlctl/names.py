@@ -82,6 +82,8 @@ def element_index(name: str, shape: Sequence[int]) -> tuple[int, ...]:
     index = _numbers(name[len(base) :]) if _ELEMENT.fullmatch(name, len(base)) else ()
     wrong = name != base and not index
     if wrong or len(index) != len(shape) or any(i >= n for i, n in zip(index, shape, strict=True)):
+        if not shape:
+            raise ParameterError(f"'{base}' is one number, of which '{name}' is not an element")
         example = element_name(base, [0] * len(shape))
         raise ParameterError(
             f"'{name}' is not one number of '{base}', whose shape is {tuple(shape)}: name one, "

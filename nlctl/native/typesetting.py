@@ -111,9 +111,13 @@ def _written(read: Schedule, node: Node, values: bool) -> BlockEquations:
     try:
         return _block(read, node, values)
     except RecursionError:
-        missing = "its expressions are nested too deeply"
+        return _without(read, node, "its expressions are nested too deeply")
     except Untraceable as error:
-        missing = str(error)
+        return _without(read, node, str(error))
+
+
+def _without(read: Schedule, node: Node, missing: str) -> BlockEquations:
+    """Return that a block has no equations, and why."""
     return BlockEquations(
         block=node.path, equations=(), where=(), inputs=tuple(_connections(read, node)),
         missing=missing,
@@ -140,7 +144,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
 
     found, names = _beside_a_profiler(traced)
     for call in reader.calls.values():
-        raise Untraceable(call.reason)
+        return _without(read, node, call.reason)
     leaf = _symbols(system, slots)
     writer = LatexWriter(leaf=leaf, known=_known(system, found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)

@@ -49,6 +49,13 @@ def test_what_is_no_element_is_refused(index, engine):
         )
 
 
+def test_one_number_has_no_elements():
+    lag = ct.nlsys(lambda t, x, u, p: [-p["a"] * x[0]], None, states=1, inputs=0,
+                   params={"a": 2.0}, name="lag")  # fmt: skip
+    with pytest.raises(ParameterError, match=r"'lag\.a' is one number, of which 'lag\.a\[0\]'"):
+        nlctl.input_output_response(lag, TIMES, 0, [1.0], params={"lag.a[0]": 9.0})
+
+
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 def test_elements_go_on_top_of_the_whole_whatever_the_order(engine):
     """Alone and in a diagram."""
