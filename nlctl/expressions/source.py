@@ -61,6 +61,8 @@ def definition(function: FunctionType) -> Definition:
         raise Unreadable(f"its source cannot be parsed ({error})", "mend its file") from error
     if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
         advice = "import its module again: was the file edited since?"
+        if code.co_filename == "<string>":
+            advice = "define it in a file: it was made of a text, as by exec"
         raise Unreadable("its source is not what it was made of", advice)
     nodes = [node for node in _candidates(places, code) if _contains(node, code)]
     if not nodes or len({ast.dump(node) for node in nodes}) > 1:

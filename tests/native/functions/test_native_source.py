@@ -123,3 +123,12 @@ def test_where_a_function_from_a_pickle_cannot_be_compiled_is_said(tmp_path):
     system = ct.nlsys(f, None, states=1, inputs=0, name="counter")
     with pytest.raises(nlctl.errors.CompileError, match=r"counter\.py, line 5"):
         nlctl.compile(system)
+
+
+def test_what_was_made_of_a_text_is_not_taken_for_a_function_of_the_file():
+    """Its globals know a file in which other lines stand."""
+    names = dict(globals())
+    exec("def f(t, x, u, p):\n    return [-2 * x[0]]", names)  # the text of no file
+    with pytest.raises(Unreadable, match="is not what it was made of") as refused:
+        definition(names["f"])
+    assert "made of a text, as by exec" in refused.value.advice
