@@ -153,6 +153,7 @@ class Graph:
     def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
         self.settles = False  # whether conditions of parameters that are integers are decided
+        self.merges = False  # whether choices of numbers are followed at once, not way by way
         self.limit = UNLIMITED  # largest number of expressions for now
         # sizes of the arrays that are read, as far as known: nothing is read beyond
         self.lengths = dict(lengths or {})

@@ -10,6 +10,7 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Collection, Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -53,10 +54,26 @@ def _of_node(node: Expr, ranges: dict[Expr, _Range]) -> _Range:
         return float(node.value), float(node.value)
     parts = [ranges[arg] for arg in node.args]
     if node.op == "select":
+        parts = [_where(node, i, part, ranges) for i, part in enumerate(parts)]
         return min(parts[1][0], parts[2][0]), max(parts[1][1], parts[2][1])
     if node.op == "remainder" and parts[1][0] == parts[1][1] > 0:
         return 0.0, parts[1][0] - (1.0 if node.kind == "i" else 0.0)
     return _RULES[node.op](*parts) if node.op in _RULES else _EVERYTHING
+
+
+_ABOVE = {"gt": True, "ge": True, "lt": False, "le": False}
+
+
+def _where(node: Expr, place: int, within: _Range, ranges: dict[Expr, _Range]) -> _Range:
+    """Return bounds of what a choice takes where it does so because of its size."""
+    condition, (low, high) = node.args[0], within
+    if condition.op not in _ABOVE or node.args[place] not in condition.args:
+        return within
+    is_left = node.args[place] is condition.args[0]
+    limit = condition.args[is_left]
+    end = (float(limit.data),) * 2 if limit.op == "const" else ranges.get(limit, _EVERYTHING)
+    is_above = _ABOVE[condition.op] == (is_left == (place == 1))
+    return (max(low, end[0]), high) if is_above else (low, min(high, end[1]))
 
 
 def _product(a: _Range, b: _Range) -> _Range:
@@ -85,6 +102,7 @@ _RULES = {
 }  # fmt: skip
 
 
+NO_INTEGER = -(2.0**63)  # what NumPy casts NaN to, and what is too large for an integer
 _FOLLOWED = 16  # values of an integer, each a way through a function
 
 
@@ -211,10 +229,13 @@ def _integer(self: Tracer) -> int:
         raise Untraceable("an integer that depends on the state")
     if self.only.value is not None:
         return self.graph.assumed(self.only)
-    low, high = integer_range(self.only)
+    number, beyond = self.only, []
+    if number.op == "select" and number.args[2].data == NO_INTEGER:
+        number, beyond = number.args[1], [int(NO_INTEGER)]  # of NaN, what NumPy makes of it
+    low, high = integer_range(number)
     if high - low >= _FOLLOWED:
         raise Untraceable("an integer that may have too many values")
-    values = range(int(low), int(high) + 1)
+    values = [*range(int(low), int(high) + 1), *beyond]
     equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
     decided = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
     self.graph.implied.update({equal[k]: k == decided for k in values})
@@ -323,6 +344,8 @@ _OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
 
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
+        if isinstance(other, Fraction) and not self.shape and self.only.kind == "f":
+            other = float(other) if name in _BINARY.values() else other  # as Python does it
         row = bool(self.shape) and isinstance(other, list | tuple)
         if not (row or isinstance(other, _OPERANDS)):
             if name in ("eq", "ne"):

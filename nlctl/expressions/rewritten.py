@@ -22,8 +22,9 @@ import numpy as np
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
 from .iterated import Loop, PassWriter
+from .library.ordered import sorted_list
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
-from .operators import elementwise
+from .operators import elementwise, is_numpys
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
@@ -31,7 +32,8 @@ _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
 _KEYS = (int, float, bool)
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
-          ast.Attribute, ast.With, ast.JoinedStr)  # fmt: skip
+          ast.Attribute, ast.With, ast.JoinedStr, ast.MatchSingleton, ast.Is,
+          ast.IsNot)  # fmt: skip
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -150,10 +152,31 @@ class _Rewriter(ast.NodeTransformer):
             node.func = func
         else:
             self.generic_visit(node)
-        plain = len(node.args) == 1 and not node.keywords and isinstance(node.func, ast.Attribute)
-        if not plain or node.func.attr != "index":  # type: ignore[attr-defined]
+        if not isinstance(node.func, ast.Attribute) or node.func.attr not in ("index", "sort"):
             return node
-        return call_instead("index", node.func.value, *node.args)  # type: ignore[attr-defined]
+        if node.func.attr == "index" and (len(node.args) != 1 or node.keywords):
+            return node
+        instead = call_instead(node.func.attr, node.func.value, *node.args)
+        instead.keywords = node.keywords
+        return instead
+
+    def visit_MatchSingleton(self, node: ast.MatchSingleton) -> Any:
+        """Write a class that True, or False, is the only object of."""
+        if node.value is None:
+            return node
+        name = INSTEAD_NAME.format(str(node.value).lower())
+        kind = ast.MatchClass(ast.Name(name, ast.Load()), [], [], [])
+        return ast.copy_location(kind, node)
+
+    def visit_Compare(self, node: ast.Compare) -> Any:
+        """Ask by a function whether something is True or False."""
+        self.generic_visit(node)
+        other = node.comparators[0]
+        is_asked = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
+        if not (is_asked and isinstance(other, ast.Constant) and type(other.value) is bool):
+            return node
+        answer = call_instead("truth", other, node.left)
+        return answer if isinstance(node.ops[0], ast.Is) else ast.UnaryOp(ast.Not(), answer)
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -226,6 +249,10 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
+        INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
+        INSTEAD_NAME.format("true"): _TruthType(graph, True),
+        INSTEAD_NAME.format("false"): _TruthType(graph, False),
+        INSTEAD_NAME.format("sort"): functools.partial(sorted_list, graph),
         INSTEAD_NAME.format("values"): lambda v: v if isinstance(v, Tracer) else v.values,
     }
 
@@ -319,6 +346,31 @@ def _index(whole: Any, value: Any) -> Any:
         if v is value or v == value:
             return k
     raise catchable(ValueError)
+
+
+def _is_truth(graph: Graph, value: bool, thing: Any) -> bool:
+    """Return whether a thing is True, or is False: a truth value of NumPy's is neither."""
+    if not isinstance(thing, Tracer):
+        return thing is value
+    is_parameter = not thing.shape and thing.only.op == "leaf" and thing.only.data[0] == "p"
+    if not is_parameter and (thing.shape or thing.only.kind != "b" or is_numpys(graph, thing)):
+        return False
+    if not thing.is_pythons:
+        raise Untraceable("identity of what may be Python's True or NumPy's")
+    return bool(thing) is value
+
+
+class _TruthType(type):
+    """A class for patterns, of which True or False is the only object."""
+
+    def __new__(cls, graph: Graph, value: bool) -> Any:  # noqa: D102
+        return super().__new__(cls, str(value), (), {"of": (graph, value)})
+
+    def __init__(cls, *_: object) -> None:
+        super().__init__(cls)
+
+    def __instancecheck__(cls, thing: Any) -> bool:
+        return _is_truth(*cls.of, thing)  # type: ignore[attr-defined]
 
 
 class NumberKeys(dict[Any, Any]):

@@ -77,7 +77,7 @@ def _traced(
 ) -> Tracer:  # fmt: skip
     """Follow every way; with `merging`, branches that only compute numbers are one."""
     graph.limit = len(graph.nodes) + BUDGET * (1 + merging)  # passes of loops are alike
-    assumptions = dict(graph.assumptions)
+    assumptions, graph.merges = dict(graph.assumptions), merging
     try:
         stage = Stage(graph, merging=merging)
         copy = stage.copied(function)
@@ -94,7 +94,7 @@ def _traced(
         raise Untraceable(f"{text}{_place(error)}") from error
     finally:
         graph.decisions, graph.implied, graph.guards, graph.attempts = {}, {}, [], 0
-        graph.limit = UNLIMITED
+        graph.limit, graph.merges = UNLIMITED, False
 
 
 def _followed(

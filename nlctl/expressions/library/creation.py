@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Tracer, full, mapped, traced
 from ..graph import Expr, Graph, Untraceable
-from ..operators import elementwise
+from ..operators import NO_INTEGER, elementwise
 from .complex_numbers import ComplexPair, holds_complex, paired
 from .shapes import by_moving
 from .table import ARRAY_METHODS, is_traced, of
@@ -161,7 +161,7 @@ def whole_numbers(graph: Graph, values: Tracer) -> Tracer:
             return graph.integer(e)
         limit = graph.const(2.0**63)
         fits = graph.op("lt", graph.op("absolute", e), limit)
-        lowest = graph.const(-(2.0**63))
+        lowest = graph.const(NO_INTEGER)
         return graph.integer(graph.op("select", fits, graph.op("trunc", e), lowest))
 
     cells = np.frompyfunc(cast, 1, 1)(values.cells)

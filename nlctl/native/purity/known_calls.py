@@ -74,12 +74,17 @@ _OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoption
 _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
                           "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
                          "read files before the run, and write them after it")  # fmt: skip
-_TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
+_TABLES = ("scipy.interpolate", "scipy.spatial", "scipy.sparse", "numpy.polynomial")
+_OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_zeros", "prune")
 _OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
 _OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
               "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
+# of tables and columns of pandas, without inplace=True
+_OF_COLUMNS = {"abs", "idxmax", "idxmin", "sort_values", "sort_index", "set_index", "reset_index",
+               "rename", "fillna", "dropna", "interpolate", "cummax", "cummin", "reindex", "query",
+               "between", "shift", "tail", "drop", "assign", "isin", "to_list"}  # fmt: skip
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
            "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
@@ -87,7 +92,13 @@ READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj"
            "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
            "get", "items", "keys", "values", "_asdict", "_replace", "format", "join", "lower",
            "upper", "startswith", "endswith", "split", "strip", "difference", "union",
-           "intersection", "isdisjoint", "issubset", "reduce", "accumulate", "outer"}  # fmt: skip
+           "intersection", "isdisjoint", "issubset", "reduce", "accumulate", "outer",
+           "splitlines", "replace", "lstrip", "rstrip", "rsplit", "rpartition", "removeprefix",
+           "removesuffix", "title", "capitalize", "casefold", "swapcase", "zfill", "find", "rfind",
+           "isalpha", "isdigit", "isnumeric", "isdecimal", "isalnum", "isspace", "isupper",
+           "islower", "isidentifier", "ljust", "rjust", "center", "issuperset",
+           "symmetric_difference", "most_common", "elements", "fromkeys", "conjugate",
+           "limit_denominator", "quantize", "sqrt", "exp", "ln", *_OF_COLUMNS}  # fmt: skip
 CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
             "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
             "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
@@ -159,8 +170,7 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         known = Cached(places[0]) if is_function else Bound(captured(functools.cache), Given())
         return KnownValue(True, True, known=known)
     if thing is functools.reduce and not isinstance(places[0].known, Unknown):
-        first = [element(places[1]), *places[2:]]
-        return least_upper_bound([*first, walk.call(places[0], Given((OUTSIDE, first[0])))])
+        return _reduced(walk, places)
     if isinstance(thing, enum.EnumType) and len(places) == 1 and not issubclass(thing, enum.Flag):
         if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
             raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
@@ -177,6 +187,20 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
     return OUTSIDE if any(thing is reader for reader in reading) else None
+
+
+def _reduced(walk: Walk, places: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of what `functools.reduce` makes, which it hands on each time."""
+    part, count = element(places[1]), 1
+    if isinstance(places[1].known, ListOf | list | tuple):
+        known = places[1].known
+        count = len(known.choices if isinstance(known, ListOf) else known)
+    results = [least_upper_bound([part, *places[2:]])]
+    if not isinstance(function_choice(results), OneOf):  # numbers: whatever comes out of it
+        return least_upper_bound([*results, walk.call(places[0], Given((OUTSIDE, part)))])
+    for _ in range(count):  # functions of functions: each is made of those before
+        results.append(walk.call(places[0], Given((results[-1], part))))
+    return least_upper_bound(results)
 
 
 def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
@@ -213,7 +237,7 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     cls = type(owner)  # of functions of numbers: splines, polynomials, rotations
     is_table = cls is np.poly1d or cls.__module__.startswith(_TABLES)
     if isinstance(thing, MethodType) and is_table:
-        if thing.__name__.startswith(("set_", "add_")):
+        if thing.__name__.startswith(("set_", "add_")) or thing.__name__ in _OF_SPARSE:
             raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
         return KnownValue(True, False, known=Pure())  # (other changes are named in CHANGING)
     # somebody's, or one of python-control's, can be read
@@ -280,6 +304,8 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         _written(given.places[0], "an array with .at()")
         return FRESH
     if name in READING:
+        if given.names.get("inplace", captured(False)).known is not False:
+            _written(base, f"{name}(inplace=True)")
         return _read(base, name, given.places)
     if name in VIEWS or name in ("T", "flat"):
         return forgotten(base)
@@ -381,23 +407,23 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         return walk.function(operator, Given(places))
     if name == "vars" and len(places) == 1:
         return made.attributes_of(walk, places[0])
+    by_key = _by_key(walk, name, given)
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         if name not in _ITERATING or not iterates(walk, value):
-            _check_parts(value, name)
+            _check_parts(value, name, moves=by_key or name in _MOVING)
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
         known = places[0].known
         return OUTSIDE if isinstance(known, Unknown) else captured(type(known))
     if name in ("min", "max"):
-        _call_functions(walk, given.names.values())
         return least_upper_bound(
             [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
         )
     if thing is map and not isinstance(places[0].known, Unknown):
         return holder([walk.call(places[0], Given(tuple(map(element, places[1:]))))])
     if thing in MAKING:
-        _call_functions(walk, given.every)
+        _call_functions(walk, given.places if by_key else given.every)
         inside = all(v.inside for v in places)
         return KnownValue(True, inside, True, known=_rows(thing, places))
     if name == "next":
@@ -418,13 +444,25 @@ _ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter
 _MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
 
 
-def _check_parts(value: KnownValue, name: str) -> None:
+def _by_key(walk: Walk, name: str, given: Given) -> bool:
+    """Walk the key by which things are put in order, if there is one: they are only moved then."""
+    key = given.names.get("key", captured(None))
+    if name not in ("min", "max", "sorted") or key.known is None:
+        return False
+    whole = len(given.places) == 1
+    thing = element(given.places[0]) if whole else least_upper_bound(given.places)
+    if not isinstance(key.known, Unknown):
+        walk.call(key, Given((thing,)))
+    return True
+
+
+def _check_parts(value: KnownValue, name: str, moves: bool) -> None:
     """Check what a builtin does with a value, and with what is in it unless it only moves that."""
     known = value.known
-    if isinstance(known, ListOf) and name in _MOVING:
+    if isinstance(known, ListOf) and moves:
         return
     check_object(value, f"calls {name}() of")
-    if isinstance(known, list | tuple) and name not in _MOVING:
+    if isinstance(known, list | tuple) and not moves:
         for part in known:
             if not callable(part) or not isinstance(part, FunctionType | MethodType | np.ufunc):
                 check_object(captured(part), f"calls {name}() of a list that holds")
@@ -484,7 +522,7 @@ def _makes_objects(thing: object, module: str) -> bool:
     cls = thing if isinstance(thing, type) else getattr(thing, "__self__", None)
     if isinstance(cls, type) and not issubclass(cls, np.generic | np.ndarray | CONTAINERS):
         return module.partition(".")[0] in ("numpy", "scipy")
-    return module.startswith(("scipy.interpolate", "scipy.spatial"))
+    return module.startswith(("scipy.interpolate", "scipy.spatial", "scipy.sparse"))
 
 
 def _call_functions(walk: Walk, values: Any) -> None:
