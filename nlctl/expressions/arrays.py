@@ -77,6 +77,7 @@ class Tracer:
     # elements of which this long array was made as another shape, and what they were then
     watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
     is_pythons: bool = False  # whether it is known to be a number of Python's own, not NumPy's
+    is_column: bool = False  # whether it is a column of a table of pandas
     labels: Mapping[str, int] = field(default_factory=dict)  # of a column of pandas: where each is
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these

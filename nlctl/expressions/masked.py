@@ -72,8 +72,8 @@ class Masked(Computed):
             is_it = self.mask[i]
             if rank:
                 is_it = elementwise(graph, "and", is_it, elementwise(graph, "eq", before, rank))
-                before = elementwise(graph, "add", before, elementwise(graph, "select",
-                                                                       self.mask[i], 1, 0))  # fmt: skip
+                one = elementwise(graph, "select", self.mask[i], 1, 0)
+                before = elementwise(graph, "add", before, one)
             places.append((i, is_it))
         for i, is_it in reversed(places[:-1]):
             chosen = elementwise(graph, "select", is_it, self.whole[i], chosen)

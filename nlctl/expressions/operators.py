@@ -182,7 +182,7 @@ def _matrix_product(graph: Graph, a: object, b: object) -> Any:
     if is_complex(a) or is_complex(b):
         assert Special.of_complex is not None
         return Special.of_complex(graph, a) @ b
-    if isinstance(a, Special) or isinstance(b, Special):
+    if any(isinstance(v, Special) or hasattr(type(v), "_forwards") for v in (a, b)):
         return NotImplemented
     return product(traced(graph, a), traced(graph, b))
 

@@ -363,7 +363,7 @@ def _is_truth(graph: Graph, value: bool, thing: Any) -> bool:
 class _TruthType(type):
     """A class for patterns, of which True or False is the only object."""
 
-    def __new__(cls, graph: Graph, value: bool) -> Any:  # noqa: D102
+    def __new__(cls, graph: Graph, value: bool) -> Any:
         return super().__new__(cls, str(value), (), {"of": (graph, value)})
 
     def __init__(cls, *_: object) -> None:

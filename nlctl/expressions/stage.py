@@ -154,6 +154,8 @@ class Stage:
     def _column(self, value: Any) -> Any:
         """Return a column of numbers of pandas: an array, and by labels its elements."""
         array = self.fresh(np.array(value, dtype=float))
+        if isinstance(array, Tracer):
+            array.is_column = hasattr(value, "iloc")
         if isinstance(array, Tracer) and hasattr(value, "index") and value.index.is_unique:
             array.labels = {k: i for i, k in enumerate(value.index) if isinstance(k, str)}
         return array

@@ -155,11 +155,22 @@ def test_where_a_rank_is_lost_the_function_is_called():
     np.testing.assert_allclose(response.outputs[:, -1], ends, rtol=1e-5)
 
 
-@pytest.mark.parametrize("cases", ["True", "False"])
-def test_a_case_of_a_truth_value_asks_for_identity_and_is_refused(cases):
-    source = {"True": _true, "False": _false}[cases]
-    with pytest.raises(nlctl.errors.CompileError, match="identity"):
-        nlctl.compile(ct.nlsys(source, None, states=1, inputs=1, outputs=1))
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_a_case_of_a_truth_value_asks_for_identity(above):
+    """Python's own comparison is True or False itself; NumPy's equals it, and is not it."""
+    for source in (_true, _false, _of_numpy):
+        system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
+        compiled = nlctl.compile(system)
+        assert not compiled.equations.calls
+        assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+def _of_numpy(t, x, u, params):
+    match x[0] > 1.0:
+        case True | False:
+            return [1.0]
+        case _:
+            return [2.0 if (x[0] > 1.0) is False else 3.0]
 
 
 def _true(t, x, u, params):

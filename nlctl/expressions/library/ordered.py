@@ -15,7 +15,6 @@ import numpy as np
 from ..arrays import Tracer, python_number, scalar, traced
 from ..graph import Expr, Graph
 from ..operators import elementwise
-from .table import is_traced
 
 _SORTED = 16  # things that are sorted by exchanges: there is one for every two
 
@@ -110,10 +109,9 @@ def first_ones(reverse: bool) -> Callable[..., Any]:
     return written
 
 
-def sorted_list(graph: Graph, whole: Any, *rest: Any, **options: Any) -> None:
-    """Do what ``whole.sort()`` does."""
-    if type(whole) is list and not rest and any(map(is_traced, whole)):
-        whole[:] = sorted_things(graph, whole, **options)
-    else:
-        whole.sort(*rest, **options)
-
+def sorted_list(graph: Graph, whole: Any, *rest: Any, **options: Any) -> Any:
+    """Do what ``whole.sort()`` does; NumPy's ``np.sort(values)`` is spelt like that, too."""
+    if type(whole) is not list or rest:
+        return whole.sort(*rest, **options)
+    whole[:] = sorted_things(graph, whole, **options)
+    return None

@@ -266,18 +266,6 @@ def _is_float(graph: Graph, number: Tracer) -> bool:
     return number.only.kind == "f" and not (graph.mixed and graph.may_be_whole(number.only))
 
 
-@of(np.frompyfunc, makes=True)
-def frompyfunc(graph: Graph, function: Callable[..., Any], nin: int, nout: int) -> Any:
-    """Return a function of numbers; of arrays NumPy's returns arrays of objects."""
-
-    def of_numbers(*arguments: tuple[Any, ...]) -> Any:
-        if nout != 1 or any(traced(graph, a).shape for a in arguments):
-            raise Untraceable("np.frompyfunc of arrays")
-        return function(*(_handed_over(graph, a) for a in arguments))
-
-    return of_numbers
-
-
 def _handed_over(graph: Graph, value: object) -> Any:
     """Return what NumPy hands a function for an element: a number of Python's."""
     return python_number(graph, traced(graph, value).only)

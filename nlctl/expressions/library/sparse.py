@@ -36,9 +36,7 @@ def sparse_product(graph: Graph, matrix: Any, array: Tracer) -> Tracer:
     zero = traced(graph, 0.0) if array.ndim == 1 else traced(graph, np.zeros(array.shape[1]))
     rows = [zero] * matrix.shape[0]
     for i, j, number in _terms(matrix):
-        rows[i] = elementwise(
-            graph, "add", rows[i], elementwise(graph, "mul", number, array[j])
-        )
+        rows[i] = elementwise(graph, "add", rows[i], elementwise(graph, "mul", number, array[j]))
     return traced(graph, rows)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from ...expressions.library.table import WRITTEN
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
+from .method_names import CHANGING, IN_PLACE, READING, VIEWS, WRITERS
 from .values import (
     FRESH,
     OUTSIDE,
@@ -54,18 +55,6 @@ from .walk import Walk
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
 DRAW = "draw the values before the run and give them as an input"
-# functions and methods that may return part of what they are given
-VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
-         "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
-         "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
-         "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
-         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
-         "to_numpy", "sliding_window_view"}  # fmt: skip
-WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
-           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
-           "heappushpop"}  # fmt: skip
-IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
-            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
 # functions that draw random numbers inside, read or write files, or change settings for everybody
 _OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
            "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
@@ -81,28 +70,6 @@ _OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrow
               "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
-# of tables and columns of pandas, without inplace=True
-_OF_COLUMNS = {"abs", "idxmax", "idxmin", "sort_values", "sort_index", "set_index", "reset_index",
-               "rename", "fillna", "dropna", "interpolate", "cummax", "cummin", "reindex", "query",
-               "between", "shift", "tail", "drop", "assign", "isin", "to_list"}  # fmt: skip
-# methods that change nothing, of arrays, numbers, texts, dicts and lists
-READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
-           "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
-           "prod", "repeat", "round", "searchsorted", "std", "sum", "take", "tolist", "trace",
-           "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
-           "get", "items", "keys", "values", "_asdict", "_replace", "format", "join", "lower",
-           "upper", "startswith", "endswith", "split", "strip", "difference", "union",
-           "intersection", "isdisjoint", "issubset", "reduce", "accumulate", "outer",
-           "splitlines", "replace", "lstrip", "rstrip", "rsplit", "rpartition", "removeprefix",
-           "removesuffix", "title", "capitalize", "casefold", "swapcase", "zfill", "find", "rfind",
-           "isalpha", "isdigit", "isnumeric", "isdecimal", "isalnum", "isspace", "isupper",
-           "islower", "isidentifier", "ljust", "rjust", "center", "issuperset",
-           "symmetric_difference", "most_common", "elements", "fromkeys", "conjugate",
-           "limit_denominator", "quantize", "sqrt", "exp", "ln", *_OF_COLUMNS}  # fmt: skip
-CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
-            "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
-            "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
-            "rotate"}  # fmt: skip
 CONTAINERS = (
     np.ndarray
     | np.generic

@@ -184,7 +184,7 @@ def prints(t, x, u, params):
     return x
 
 def tests_identity(t, x, u, params):
-    return x if params["flag"] is True else -x
+    return x if params["flag"] is x else -x
 
 def writes_in_a_lambda(t, x, u, params):
     keep = lambda v: HISTORY.append(v)

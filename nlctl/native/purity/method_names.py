@@ -1,0 +1,36 @@
+"""Names of functions and methods: what they do to what they are given."""
+
+# functions and methods that may return part of what they are given
+VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
+         "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
+         "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
+         "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
+         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
+         "to_numpy", "sliding_window_view"}  # fmt: skip
+WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
+           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
+           "heappushpop"}  # fmt: skip
+IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
+            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
+# of tables and columns of pandas, without inplace=True
+_OF_COLUMNS = {"abs", "idxmax", "idxmin", "sort_values", "sort_index", "set_index", "reset_index",
+               "fillna", "dropna", "cummax", "cummin", "reindex", "to_dict", "iterrows",
+               "itertuples"}  # fmt: skip
+_OF_TEXTS = {"format", "join", "lower", "upper", "startswith", "endswith", "split", "strip",
+             "splitlines", "replace", "lstrip", "rstrip", "rsplit", "rpartition", "removeprefix",
+             "removesuffix", "title", "capitalize", "casefold", "swapcase", "zfill", "find",
+             "rfind", "isalpha", "isdigit", "isnumeric", "isdecimal", "isalnum", "isspace",
+             "isupper", "islower", "isidentifier", "ljust", "rjust"}  # fmt: skip
+# methods that change nothing, of arrays, numbers, texts, dicts and lists
+READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
+           "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
+           "prod", "repeat", "round", "searchsorted", "std", "sum", "take", "tolist", "trace",
+           "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
+           "get", "items", "keys", "values", "_asdict", "_replace", "difference", "union",
+           "intersection", "isdisjoint", "issubset", "issuperset", "symmetric_difference",
+           "reduce", "accumulate", "outer", "limit_denominator", *_OF_TEXTS,
+           *_OF_COLUMNS}  # fmt: skip
+CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
+            "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
+            "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
+            "rotate"}  # fmt: skip
