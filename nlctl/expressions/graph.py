@@ -167,6 +167,7 @@ class Graph:
         self.mixed: set[Expr] = set()
         # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
+        self.answers: Callable[[Expr], bool] | None = None  # what decides of the rest
         self.implied: dict[Expr, bool] = {}  # what follows from that
         # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
@@ -189,7 +190,9 @@ class Graph:
                 for integer in condition.args:
                     self.assumed(integer)
                 return bool(numpy_function(condition.op)(*values))
-            raise OpenCondition(condition)
+            if self.answers is None:
+                raise OpenCondition(condition)
+            self.decisions[condition] = self.answers(condition)
         return self.decisions[condition]
 
     def guard(self, condition: Expr, error: type[Exception]) -> None:

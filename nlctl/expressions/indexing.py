@@ -142,7 +142,7 @@ def _assign(self: Tracer, key: Any, value: object) -> None:
         return _scattered(self, key, place, value)
     value = traced(self.graph, value)
     _check_kinds(self, value)
-    if self.watched is not None:
+    if self.watched:
         raise Untraceable("assignment to another shape of an array")
     if holds_arrays(key):
         return _assign_at(self, key, value)

@@ -200,6 +200,8 @@ def _batched(a: Tracer, b: Tracer) -> Tracer:
 def _truth(self: Tracer) -> bool:
     if self.size != 1 or self.axis is not None:
         raise Untraceable("the truth value of an array")
+    if self.missing is not None and self.graph.decided(self.missing):
+        return False
     condition = self.graph.op("ne", self.only, self.graph.const(0.0))
     return self.graph.decided(self.only if self.only.kind == "b" else condition)
 
@@ -344,7 +346,7 @@ _OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
 
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
-        if isinstance(other, Fraction) and not self.shape and self.only.kind == "f":
+        if type(other) is Fraction and not self.shape and self.only.kind == "f":
             other = float(other) if name in _BINARY.values() else other  # as Python does it
         row = bool(self.shape) and isinstance(other, list | tuple)
         if not (row or isinstance(other, _OPERANDS)):

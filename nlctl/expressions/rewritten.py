@@ -14,7 +14,7 @@ import copy
 import dis
 import functools
 from collections.abc import Callable, Mapping
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, NoneType
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
 from .iterated import Loop, PassWriter
 from .library.ordered import sorted_list
-from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
+from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
 from .operators import elementwise, is_numpys
 from .source import Definition, Unreadable, definition
 
@@ -169,13 +169,15 @@ class _Rewriter(ast.NodeTransformer):
         return ast.copy_location(kind, node)
 
     def visit_Compare(self, node: ast.Compare) -> Any:
-        """Ask by a function whether something is True or False."""
+        """Ask by a function whether something is True, False or None."""
         self.generic_visit(node)
         other = node.comparators[0]
         is_asked = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
-        if not (is_asked and isinstance(other, ast.Constant) and type(other.value) is bool):
+        is_one = isinstance(other, ast.Constant) and type(other.value) in (bool, NoneType)
+        if not (is_asked and is_one):
             return node
-        answer = call_instead("truth", other, node.left)
+        none = call_instead("none", node.left)
+        answer = none if other.value is None else call_instead("truth", other, node.left)
         return answer if isinstance(node.ops[0], ast.Is) else ast.UnaryOp(ast.Not(), answer)
 
     def visit_Raise(self, node: ast.Raise) -> Any:
@@ -250,6 +252,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
+        INSTEAD_NAME.format("none"): functools.partial(is_none, graph),
         INSTEAD_NAME.format("true"): _TruthType(graph, True),
         INSTEAD_NAME.format("false"): _TruthType(graph, False),
         INSTEAD_NAME.format("sort"): functools.partial(sorted_list, graph),

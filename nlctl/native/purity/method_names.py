@@ -27,7 +27,7 @@ READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj"
            "prod", "repeat", "round", "searchsorted", "std", "sum", "take", "tolist", "trace",
            "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
            "get", "items", "keys", "values", "_asdict", "_replace", "difference", "union",
-           "intersection", "isdisjoint", "issubset", "issuperset", "symmetric_difference",
+           "intersection", "isdisjoint", "issubset", "issuperset", "most_common",
            "reduce", "accumulate", "outer", "limit_denominator", *_OF_TEXTS,
            *_OF_COLUMNS}  # fmt: skip
 CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
