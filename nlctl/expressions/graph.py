@@ -140,13 +140,6 @@ class MessageWritten(Untraceable):
     """A way through a function writes a message."""
 
 
-class OpenCondition(BaseException):  # (what is traced may catch exceptions)
-    """A function asks whether a condition holds that is not known when it is traced."""
-
-    def __init__(self, condition: Expr) -> None:
-        self.condition = condition
-
-
 class Graph:
     """All expressions of a diagram."""
 
@@ -191,7 +184,7 @@ class Graph:
                     self.assumed(integer)
                 return bool(numpy_function(condition.op)(*values))
             if self.answers is None:
-                raise OpenCondition(condition)
+                raise Untraceable("a condition that is only known when it runs")
             self.decisions[condition] = self.answers(condition)
         return self.decisions[condition]
 

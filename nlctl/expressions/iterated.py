@@ -426,11 +426,8 @@ class Loop:
 
     def _either(self, now: Any, before: Any) -> Any:
         if before is _MISSING:
-            is_truth = (
-                isinstance(now, Tracer) and now.where_there().only.kind == "b"
-                if np.size(now) == 1
-                else False
-            )
+            single = isinstance(now, Tracer) and now.size == 1
+            is_truth = single and now.where_there().only.kind == "b"
             before = now if is_truth else np.nan
         return self._selected(self.running, now, before)
 

@@ -283,9 +283,8 @@ def truth_value(graph: Graph, value: object) -> Any:
     number, nowhere = _whether_missing(graph, value)
     assert number is not None
     if nowhere.op != "const":
-        return elementwise(
-            graph, "and", scalar(graph, graph.op("not", nowhere)), truth_value(graph, number)
-        )
+        there = scalar(graph, graph.op("not", nowhere))
+        return elementwise(graph, "and", there, truth_value(graph, number))
     return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
 
 

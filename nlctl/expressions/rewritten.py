@@ -173,8 +173,9 @@ class _Rewriter(ast.NodeTransformer):
         self.generic_visit(node)
         other = node.comparators[0]
         is_asked = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
-        is_one = isinstance(other, ast.Constant) and type(other.value) in (bool, NoneType)
-        if not (is_asked and is_one):
+        if not (is_asked and isinstance(other, ast.Constant)):
+            return node
+        if type(other.value) not in (bool, NoneType):
             return node
         none = call_instead("none", node.left)
         answer = none if other.value is None else call_instead("truth", other, node.left)

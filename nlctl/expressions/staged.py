@@ -15,7 +15,7 @@ import numpy as np
 from .arrays import Special, Tracer, traced
 from .graph import Graph, MessageWritten, Untraceable
 from .library.rotations import enter_rotations
-from .library.rows import is_table, rows_of
+from .library.rows import chosen_rows, is_table
 from .library.sparse import is_sparse, product_of
 from .library.table import (
     UFUNC_OPERATIONS,
@@ -192,7 +192,7 @@ def _forwarded(name: str) -> Callable[..., Any]:
         if name == "__len__":  # as Python says; list() asks, and takes it for an answer
             raise TypeError(f"object of type {type(real).__name__} has no len()")
         if name == "__getitem__" and is_table(real) and holds_tracers(settled(rest[0])):
-            return rows_of(stage.graph, real, rest[0])
+            return chosen_rows(stage.graph, real, rest[0])
         if name == "__getitem__" and hasattr(real, "__getitem__"):
             return stage.instead(real[settled(rest[0])])
         if name == "__bool__":

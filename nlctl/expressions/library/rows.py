@@ -20,7 +20,7 @@ def is_table(thing: object) -> bool:
     return of_pandas and type(thing).__name__ in ("DataFrame", *_INDEXERS)
 
 
-def rows_of(graph: Graph, table: Any, key: Any) -> Any:
+def chosen_rows(graph: Graph, table: Any, key: Any) -> Any:
     """Return the rows of a table, or of one of its columns, that a mask or an integer chooses."""
     column, by_place = None, type(table).__name__ == "_iLocIndexer"
     if type(table).__name__ in _INDEXERS:
@@ -35,30 +35,34 @@ def rows_of(graph: Graph, table: Any, key: Any) -> Any:
     is_mask = key.ndim == 1 and {e.kind for e in key.values.flat} == {"b"}
     if not (is_mask or (by_place and not key.shape)):
         raise Untraceable("rows of a table of pandas that depend on the state")
-    chosen = Rows(columns, key) if is_mask else Row({k: v[key] for k, v in columns.items()})
+    chosen = (
+        _ChosenRows(columns, key)
+        if is_mask
+        else _ChosenRow({k: v[key] for k, v in columns.items()})
+    )
     return chosen if column is None else chosen[list(columns)[column] if by_place else column]
 
 
-class Rows:
+class _ChosenRows:
     """Rows that a mask chooses."""
 
     def __init__(self, columns: Mapping[str, Tracer], mask: Tracer) -> None:
         self._columns, self._mask = columns, mask
 
-    def __getitem__(self, name: Any) -> Column:
+    def __getitem__(self, name: Any) -> _ChosenColumn:
         if not isinstance(name, str) or name not in self._columns:
             raise Untraceable("rows that a mask chooses, other than by a column's name")
-        return Column(self._columns[name], self._mask)
+        return _ChosenColumn(self._columns[name], self._mask)
 
     def __getattr__(self, name: str) -> Any:
         if name == "empty":
             return self[next(iter(self._columns))].count() == 0
         if name == "iloc":
-            return _Places(lambda k: Row({n: self[n].values[k] for n in self._columns}))
+            return _Places(lambda k: _ChosenRow({n: self[n].values[k] for n in self._columns}))
         return self[name]
 
 
-class Column(Masked):
+class _ChosenColumn(Masked):
     """A column of rows that a mask chooses."""
 
     @property
@@ -89,7 +93,7 @@ class Column(Masked):
         raise Untraceable("labels of rows that a mask chooses")
 
 
-class Row:
+class _ChosenRow:
     """One row."""
 
     def __init__(self, numbers: Mapping[str, Any]) -> None:

@@ -34,3 +34,12 @@ CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "rev
             "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
             "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
             "rotate"}  # fmt: skip
+# of sparse matrices, what changes them; of laws of probability; of tables of pandas
+OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_zeros", "prune")
+OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
+OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
+              "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
+# of builtins that return numbers and texts
+NUMBERS_AND_TEXTS = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float",
+                     "format", "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
+                     "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
