@@ -19,7 +19,8 @@ import numpy as np
 
 from ...expressions.library.table import WRITTEN
 from ...expressions.source import cells_of, is_dispatcher
-from . import made, method_names
+from . import made
+from . import method_names as named
 from .values import (
     FRESH,
     OUTSIDE,
@@ -182,9 +183,7 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     if type(owner).__module__.startswith(VARYING):
         if (type(owner).__name__, thing.__name__) in WRITTEN:
             return FRESH
-        if thing.__name__ in method_names.OF_LAWS and type(owner).__module__.startswith(
-            "scipy.stats"
-        ):
+        if thing.__name__ in named.OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
             raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
     if isinstance(owner, logging.Logger) and _says_nothing(walk, owner, thing.__name__):
@@ -192,17 +191,15 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
         raise Message(f"writes messages with {thing.__name__}()", OUTPUT)
     if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
-        if thing.__name__ not in method_names.OF_TABLES:
+        if thing.__name__ not in named.OF_TABLES:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
         return OUTSIDE
     cls = type(owner)  # of functions of numbers: splines, polynomials, rotations
     is_table = cls is np.poly1d or cls.__module__.startswith(_TABLES)
     if isinstance(thing, MethodType) and is_table:
-        if thing.__name__.startswith(("set_", "add_")) or thing.__name__ in method_names.OF_SPARSE:
+        if thing.__name__.startswith(("set_", "add_")) or thing.__name__ in named.OF_SPARSE:
             raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
-        return KnownValue(
-            True, False, known=Pure()
-        )  # (other changes are named in method_names.CHANGING)
+        return KnownValue(True, False, known=Pure())  # (other changes: named.CHANGING)
     # somebody's, or one of python-control's, can be read
     if function is None or (library(function) or "control").partition(".")[0] != "control":
         name = getattr(thing, "__qualname__", type(thing).__name__)
@@ -256,7 +253,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
-        if name in method_names.CHANGING and not isinstance(
+        if name in named.CHANGING and not isinstance(
             getattr(type(thing), name, None), FunctionType
         ):
             _written(base, f"{name}()")
@@ -268,13 +265,13 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if name == "at" and isinstance(thing, np.ufunc):
         _written(given.places[0], "an array with .at()")
         return FRESH
-    if name in method_names.READING:
+    if name in named.READING:
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
         return _read(base, name, given.places)
-    if name in method_names.VIEWS or name in ("T", "flat"):
+    if name in named.VIEWS or name in ("T", "flat"):
         return forgotten(base)
-    if name in method_names.CHANGING:
+    if name in named.CHANGING:
         _written(base, f"{name}()")
         return element(base) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
@@ -394,7 +391,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if name == "next":
         _written(places[0], "next()")
         return element(places[0])
-    if name in method_names.NUMBERS_AND_TEXTS:
+    if name in named.NUMBERS_AND_TEXTS:
         walk.numba_differs += ["text"] if name in ("str", "repr", "format") else []
         return FRESH
     if name == "print":
@@ -469,9 +466,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     for value in given.every:
         if not callable(value.known):
             check_object(value, f"hands {name}")
-    if name in method_names.WRITERS or (
-        module.endswith("operator") and name in method_names.IN_PLACE
-    ):
+    if name in named.WRITERS or (module.endswith("operator") and name in named.IN_PLACE):
         _written(given.places[0], f"{name}()")
         return element(given.places[0]) if "heap" in name else FRESH
     if module in ("operator", "_operator") and isinstance(thing, type):
@@ -479,7 +474,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if _makes_objects(thing, module):
         # it may hold what it is given, instead of copies
         return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
-    if name in method_names.VIEWS or given.names.get("copy", captured(True)).known is not True:
+    if name in named.VIEWS or given.names.get("copy", captured(True)).known is not True:
         return forgotten(given.places[0]) if given.places else FRESH
     return FRESH
 
