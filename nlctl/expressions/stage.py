@@ -16,6 +16,7 @@ import functools
 import inspect
 import logging
 import math
+import typing
 import warnings
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -194,7 +195,7 @@ class Stage:
         if is_dispatcher(value):
             return functools.partial(self._dispatched, value)
         if isinstance(value, CPUDispatcher | FunctionType):
-            if value in (dataclasses.dataclass, collections.namedtuple):
+            if value in (dataclasses.dataclass, collections.namedtuple, typing.NamedTuple):
                 return value  # they look at types, defaults and names alone
             if staged.is_of_a_library(value):
                 return self._library("", value)

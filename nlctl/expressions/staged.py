@@ -27,7 +27,7 @@ from .library.table import (
 )
 from .operators import elementwise
 
-LIBRARIES = ("numpy", "scipy", "numba", "pandas")
+LIBRARIES = ("numpy", "scipy", "numba", "pandas", "json", "re")
 
 
 _PLACES = ("loc", "iloc", "at", "iat")  # of a table of pandas: what is indexed

@@ -246,7 +246,24 @@ class Expressions(ast.NodeVisitor):
         self.operands(values)
         return least_upper_bound(values)
 
+    def decided(self, test: ast.expr) -> bool | None:
+        """Return what ``isinstance`` says of what is known to be of one class, None of others."""
+        if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+            answer = self.decided(test.operand)
+            return None if answer is None else not answer
+        plain = isinstance(test, ast.Call) and len(test.args) == 2 and not test.keywords
+        if not plain or self.visit(test.func).known is not isinstance:
+            return None
+        thing, kinds = (self.visit(part).known for part in test.args)
+        cls = thing.cls if isinstance(thing, Instance) else type(thing)
+        if not isinstance(thing, (Instance, *PLAIN)) or not isinstance(kinds, type):
+            return None
+        return issubclass(cls, kinds)
+
     def visit_IfExp(self, node: ast.IfExp) -> KnownValue:
+        answer = self.decided(node.test)
+        if answer is not None:
+            return self.visit(node.body if answer else node.orelse)
         self.condition(node.test)
         return least_upper_bound([self.visit(node.body), self.visit(node.orelse)])
 
@@ -350,7 +367,7 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
-            if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
+            if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.MAKERS):
                 return captured(value)  # a method, a new one each time it is read
             if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):
                 return captured(value)  # a part of a table that is noted

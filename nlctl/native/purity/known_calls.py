@@ -8,6 +8,7 @@ import enum
 import functools
 import inspect
 import logging
+import re
 import warnings
 from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
@@ -61,7 +62,7 @@ _OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing
            "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
 _OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
 _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
-                          "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
+                          "loads", "dump", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
                          "read files before the run, and write them after it")  # fmt: skip
 _TABLES = ("scipy.interpolate", "scipy.spatial", "scipy.sparse", "numpy.polynomial")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
@@ -83,6 +84,7 @@ CONTAINERS = (
     | complex
     | range
 )
+MAKERS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 
@@ -186,6 +188,8 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
         if thing.__name__ in named.OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
             raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if isinstance(owner, re.Pattern | re.Match):
+        return KnownValue(True, True, known=Pure())
     if isinstance(owner, logging.Logger) and _says_nothing(walk, owner, thing.__name__):
         return FRESH
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
@@ -250,6 +254,8 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         return _of_list(base, name, given.places)
     if isinstance(thing, Pure) and name == "shuffle":
         _written(given.places[0], "shuffle()")
+    if isinstance(thing, Pure) and name == "rvs":
+        raise Impure("draws random numbers with rvs()", DRAW)
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -456,11 +462,13 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     name = getattr(thing, "__name__", "")
     if name in _SEEDED and given.places and type(given.places[0].known) is int:
         return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
+    if module.startswith("scipy.stats") and hasattr(thing, "freeze"):
+        return KnownValue(True, True, known=Pure())  # a law of probability, with its numbers
     if module.startswith(VARYING) and not module.startswith("numpy.lib.stride_tricks"):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
         raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
-    if name in _OTHERS:
+    if name in _OTHERS and (module, name) != ("json", "loads"):  # which takes a text apart
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
     _call_functions(walk, given.every)
     for value in given.every:
@@ -484,7 +492,7 @@ def _makes_objects(thing: object, module: str) -> bool:
     cls = thing if isinstance(thing, type) else getattr(thing, "__self__", None)
     if isinstance(cls, type) and not issubclass(cls, np.generic | np.ndarray | CONTAINERS):
         return module.partition(".")[0] in ("numpy", "scipy")
-    return module.startswith(("scipy.interpolate", "scipy.spatial", "scipy.sparse"))
+    return module.startswith(("scipy.interpolate", "scipy.spatial", "scipy.sparse", "re"))
 
 
 def _call_functions(walk: Walk, values: Any) -> None:

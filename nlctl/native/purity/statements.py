@@ -66,6 +66,9 @@ class CallWalker(Expressions):
     def statements(self, body: Sequence[ast.stmt]) -> None:
         for statement in body:
             self.visit(statement)
+            answer = self.decided(statement.test) if isinstance(statement, ast.If) else None
+            if answer is not None and _leaves(statement.body if answer else statement.orelse):  # type: ignore[attr-defined]
+                break
 
     def visit_Expr(self, node: ast.Expr) -> None:
         self.visit(node.value)
@@ -138,8 +141,12 @@ class CallWalker(Expressions):
         self.frame.shared |= dict.fromkeys(node.names, "nonlocal")
 
     def visit_If(self, node: ast.If) -> None:
-        self.condition(node.test)
-        if self.is_off(node.test):
+        answer = self.decided(node.test)
+        if answer is None:
+            self.condition(node.test)
+        if answer is not None:
+            self.statements(node.body if answer else node.orelse)
+        elif self.is_off(node.test):
             self.statements(node.orelse)
         else:
             self.either([node.body, node.orelse])
@@ -157,7 +164,7 @@ class CallWalker(Expressions):
         for body in bodies:
             self.frame.names = dict(before)
             self.statements(body)
-            if not (body and isinstance(body[-1], ast.Return | ast.Raise)):
+            if not _leaves(body):
                 ends.append(self.frame.names)
         self.frame.names = merged(ends or [before])
         everywhere = [name for name in self.frame.names if all(name in end for end in ends)]
@@ -277,8 +284,19 @@ class CallWalker(Expressions):
         if node not in self.walk.classes:
             calls = [d.func if isinstance(d, ast.Call) else d for d in node.decorator_list]
             decorators = [self.visit(call).known for call in calls]
-            self.walk.classes[node] = class_defined_in(node, self.frame.function, decorators)
+            bases = [self.visit(base).known for base in node.bases]
+            known = {k: v.known for k, v in self.frame.names.items()}
+            made_here = set(map(id, self.walk.classes.values()))
+            others = {k: v for k, v in known.items() if id(v) in made_here}
+            self.walk.classes[node] = class_defined_in(
+                node, self.frame.function, decorators, bases, others
+            )
         self.assign(node.name, captured(self.walk.classes[node]))
+
+
+def _leaves(body: Sequence[ast.stmt]) -> bool:
+    """Whether statements end with a way out of the function."""
+    return bool(body) and isinstance(body[-1], ast.Return | ast.Raise)
 
 
 def _imported(name: str, package: str | None = None) -> Any:
