@@ -251,8 +251,7 @@ class Expressions(ast.NodeVisitor):
         if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
             answer = self.decided(test.operand)
             return None if answer is None else not answer
-        plain = isinstance(test, ast.Call) and len(test.args) == 2 and not test.keywords
-        if not plain or self.visit(test.func).known is not isinstance:
+        if not isinstance(test, ast.Call) or self.visit(test.func).known is not isinstance:
             return None
         thing, kinds = (self.visit(part).known for part in test.args)
         cls = thing.cls if isinstance(thing, Instance) else type(thing)
@@ -367,7 +366,9 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
-            if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.MAKERS):
+            if isinstance(value, BuiltinFunctionType) and isinstance(
+                thing, known_calls.WITH_METHODS
+            ):
                 return captured(value)  # a method, a new one each time it is read
             if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):
                 return captured(value)  # a part of a table that is noted
@@ -477,9 +478,8 @@ def _of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
         if len(keys) > 1 or not isinstance(key, PLAIN):
             return inside
         parts = [captured(thing[key]) for thing in known if key in thing]
-        return least_upper_bound([*parts]) if parts else inside
-    lists = all(isinstance(thing, list | tuple) for thing in known)
-    return element(base) if lists else base
+        return least_upper_bound(parts) if parts else inside
+    return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
 
 
 def _is_plain_attribute(thing: object, name: str) -> bool:

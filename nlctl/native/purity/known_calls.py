@@ -56,14 +56,9 @@ from .walk import Walk
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
 DRAW = "draw the values before the run and give them as an input"
-# functions that draw random numbers inside, read or write files, or change settings for everybody
-_OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
-           "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
-           "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
-_OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
-_OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
-                          "loads", "dump", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
-                         "read files before the run, and write them after it")  # fmt: skip
+_FILES = "read files before the run, and write them after it"
+_ADVICE = {DRAW: named.DRAWING, MEMORY: named.SETTING, _FILES: named.OF_FILES}
+_OTHERS = {name: advice for advice, names in _ADVICE.items() for name in names}
 _TABLES = ("scipy.interpolate", "scipy.spatial", "scipy.sparse", "numpy.polynomial")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
@@ -84,7 +79,7 @@ CONTAINERS = (
     | complex
     | range
 )
-MAKERS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
+WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 
@@ -252,10 +247,10 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given.places)
-    if isinstance(thing, Pure) and name == "shuffle":
-        _written(given.places[0], "shuffle()")
     if isinstance(thing, Pure) and name == "rvs":
         raise Impure("draws random numbers with rvs()", DRAW)
+    if isinstance(thing, Pure) and name == "shuffle":
+        _written(given.places[0], "shuffle()")
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -417,10 +412,9 @@ def _by_key(walk: Walk, name: str, given: Given) -> bool:
     key = given.names.get("key", captured(None))
     if name not in ("min", "max", "sorted") or key.known is None:
         return False
-    whole = len(given.places) == 1
-    thing = element(given.places[0]) if whole else least_upper_bound(given.places)
+    places = given.places if len(given.places) > 1 else [element(given.places[0])]
     if not isinstance(key.known, Unknown):
-        walk.call(key, Given((thing,)))
+        walk.call(key, Given((least_upper_bound(places),)))
     return True
 
 
@@ -467,7 +461,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if module.startswith(VARYING) and not module.startswith("numpy.lib.stride_tricks"):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
-        raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
+        raise Impure(f"calls {name}, which reads or writes files", _FILES)
     if name in _OTHERS and (module, name) != ("json", "loads"):  # which takes a text apart
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
     _call_functions(walk, given.every)

@@ -44,3 +44,9 @@ NUMBERS_AND_TEXTS = {"abs", "all", "any", "bool", "callable", "chr", "complex", 
                      "format", "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord",
                      "pow", "range", "repr", "round", "slice", "str", "sum", "bytes", "object",
                      "bin", "hex"}  # fmt: skip
+# functions that draw random numbers inside, change settings for everybody, read or write files
+DRAWING = ("differential_evolution", "basinhopping", "dual_annealing", "eigs", "eigsh", "svds",
+           "lobpcg", "kmeans", "kmeans2", "estimate_rank", "interp_decomp")  # fmt: skip
+SETTING = ("seterr", "seterrcall", "setbufsize", "set_printoptions")
+OF_FILES = ("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt", "loads", "dump",
+            "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint")  # fmt: skip

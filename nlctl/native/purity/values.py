@@ -23,7 +23,8 @@ _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
               "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
-              "statistics", "fractions", "decimal", "pandas", "heapq", "_heapq", "json", "re")  # fmt: skip
+              "statistics", "fractions", "decimal", "pandas", "heapq", "_heapq", "json",
+              "re")  # fmt: skip
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
