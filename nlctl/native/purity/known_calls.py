@@ -62,23 +62,8 @@ _OTHERS = {name: advice for advice, names in _ADVICE.items() for name in names}
 _TABLES = ("scipy.interpolate", "scipy.spatial", "scipy.sparse", "numpy.polynomial")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
-CONTAINERS = (
-    np.ndarray
-    | np.generic
-    | np.ufunc
-    | dict
-    | list
-    | tuple
-    | set
-    | frozenset
-    | str
-    | bytes
-    | bool
-    | int
-    | float
-    | complex
-    | range
-)
+CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | frozenset | str
+              | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
@@ -412,7 +397,8 @@ def _by_key(walk: Walk, name: str, given: Given) -> bool:
     key = given.names.get("key", captured(None))
     if name not in ("min", "max", "sorted") or key.known is None:
         return False
-    places = given.places if len(given.places) > 1 else [element(given.places[0])]
+    places = list(given.places)
+    places = [element(places[0])] if len(places) == 1 else places
     if not isinstance(key.known, Unknown):
         walk.call(key, Given((least_upper_bound(places),)))
     return True
