@@ -112,8 +112,8 @@ class Tracer:
     @property
     def cells(self) -> np.ndarray:
         """The expressions."""
-        if self.missing is not None:
-            self.graph.guard(self.graph.op("not", self.missing), TypeError)
+        if self.missing is not None and self.graph.decisions.get(self.missing) is not False:
+            raise Untraceable("what may be None")
         if self.origin is not None and self.origin[0].version != self.origin[1]:
             raise Untraceable("part of an array that has been assigned to since")
         if self.watched and any(tuple(elements.flat) != then for elements, then in self.watched):
@@ -295,6 +295,12 @@ class Tracer:
     def where_there(self) -> Tracer:
         """Return the array as it is where it is not None."""
         return self if self.missing is None else replace(self, missing=None)
+
+    def there(self) -> Tracer:
+        """Return the array: where it is None, Python raises an error."""
+        if self.missing is not None:
+            self.graph.guard(self.graph.op("not", self.missing), TypeError)
+        return self.where_there()
 
     def watch(self) -> tuple[np.ndarray, tuple[Expr, ...]]:
         """Return the elements with what they are now: whether they are assigned to later."""

@@ -19,7 +19,7 @@ GATHERED = 64  # places among which an integer may choose
 
 def _item(self: Tracer, key: Any) -> Any:
     """Return elements; those of a mask, or at a place that the state decides, as choices."""
-    key = _settled(key)
+    self, key = self.there(), _settled(key)
     if isinstance(key, str) and key in self.labels:
         return self.item_at(self.labels[key])
     if isinstance(key, Tracer) and _is_mask(key):

@@ -47,7 +47,7 @@ class PassWriter(ast.NodeTransformer):
                 if len(rest) > 1 or not all(isinstance(s, ast.Return | ast.Raise) for s in rest):
                     break
                 if not rest and not _is_endless(statement):
-                    rest = [ast.Return(ast.Constant(None))]
+                    rest = [ast.Return(call_instead("nothing"))]
                 written = self._loop(statement, rest)
                 node.body[place:] = written or node.body[place:]
                 break
@@ -265,6 +265,7 @@ def _assigned(body: Sequence[ast.stmt]) -> tuple[list[str] | None, list[str]]:
 
 
 _MISSING = object()
+NOTHING = object()  # what a function returns that ends without saying so
 
 
 class Loop:
@@ -385,9 +386,10 @@ class Loop:
             guards = len(self.graph.guards)
             rest, value = self.results, other()
             self._guarded(guards, op("not", returned))
-            if value is None and rest and any(isinstance(v, list | tuple) for _, v in rest):
+            if value is NOTHING and any(isinstance(v, list | tuple) for _, v in rest):
                 self.graph.guard(returned, TypeError)  # what is taken apart is not None
                 *rest, (_, value) = rest
+            value = None if value is NOTHING else value
         for condition, earlier in reversed(rest):
             value = self._selected(condition, earlier, value)
         return value

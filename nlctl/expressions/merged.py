@@ -164,7 +164,10 @@ def _one(statement: ast.stmt) -> _Values | None:
             return _at_once(target.elts, value.elts)
     elif isinstance(statement, ast.AugAssign):
         target = statement.target
-        value = ast.BinOp(_as_read(target), statement.op, statement.value)
+        before = _as_read(target)
+        if isinstance(target, ast.Name):
+            before = call_instead("number", before)
+        value = ast.BinOp(before, statement.op, statement.value)
     else:
         return None
     plain = isinstance(target, ast.Name | ast.Subscript)
@@ -219,7 +222,7 @@ def call_instead(name: str, *given: ast.expr) -> ast.Call:
 def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that `Merger` writes."""
     functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite,
-                 "fails": _fails}  # fmt: skip
+                 "fails": _fails, "number": _number}  # fmt: skip
     return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
@@ -244,6 +247,13 @@ def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[],
     if both is None:
         return yes() if test else no()
     return both[0]
+
+
+def _number(_: Graph, value: Any) -> Any:
+    """Return a number that another replaces; an array is changed, and whoever else has it sees."""
+    if np.ndim(value) if not isinstance(value, Tracer) else value.where_there().shape:
+        raise Untraceable("an array that is changed where a condition holds")
+    return value
 
 
 def _fails(graph: Graph, test: object) -> Any:
@@ -316,8 +326,8 @@ def chosen(graph: Graph, condition: Expr, one: object, other: object) -> Any:
     if a is None or b is None or a.shape != b.shape:
         raise Untraceable("branches with something else than numbers")
     kinds = {e.kind for v in (a, b) for e in v.values.flat}
-    is_long = a.axis is not None or b.axis is not None
-    if is_long or (len(kinds) > 1 and ("b" in kinds or a.shape)):
+    is_part = any(v.axis is not None or v.origin is not None for v in (a, b))
+    if is_part or (len(kinds) > 1 and ("b" in kinds or a.shape)):
         raise Untraceable("branches with something else than numbers")
     result = elementwise(graph, "select", scalar(graph, condition), a, b)
     if a.shape:  # another array: what is assigned to any of them is not followed

@@ -179,6 +179,7 @@ def product(a: Tracer, b: Tracer) -> Tracer:
 
 
 def _matrix_product(graph: Graph, a: object, b: object) -> Any:
+    a, b = (v.there() if isinstance(v, Tracer) else v for v in (a, b))
     if is_complex(a) or is_complex(b):
         assert Special.of_complex is not None
         return Special.of_complex(graph, a) @ b
@@ -323,6 +324,7 @@ def _is_integer(value: object) -> bool:
 
 def _power(base: Any, exponent: Any) -> Any:
     """Return a power: with a whole exponent, known or assumed, as products."""
+    base, exponent = (v.there() if isinstance(v, Tracer) else v for v in (base, exponent))
     if _is_integer(exponent) and exponent.only.value is not None:
         exponent = _integer(exponent)
     if isinstance(exponent, float) and exponent.is_integer():
@@ -344,8 +346,20 @@ _OF_BITS: dict[str, Callable[..., Any]] = dict.fromkeys(("and", "or", "xor"), bi
 _OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
 
 
+def _is_none_here(value: object) -> bool:
+    """Whether a number that may be None is so on this way."""
+    if not isinstance(value, Tracer) or value.missing is None:
+        return False
+    if value.where_there().shape:
+        raise Untraceable("comparison of what may be None or an array")
+    return value.graph.decided(value.missing)
+
+
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
+        if name in ("eq", "ne") and any(map(_is_none_here, (self, other))):  # no error of None
+            return name == "ne"
+        self, other = self.there(), other.there() if isinstance(other, Tracer) else other
         if type(other) is Fraction and not self.shape and self.only.kind == "f":
             other = float(other) if name in _BINARY.values() else other  # as Python does it
         row = bool(self.shape) and isinstance(other, list | tuple)
@@ -432,6 +446,11 @@ def _shift(way: int, swapped: bool) -> Callable[[Tracer, object], Any]:
     return method
 
 
+def _of_one(name: str, value: Tracer) -> Tracer:
+    """Return an operation on one number or array."""
+    return _as_their_result(elementwise(value.graph, name, value.there()), [value])
+
+
 _BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
 for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
     setattr(Tracer, f"__{_name}__", _operator(_op))
@@ -440,7 +459,7 @@ for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Tracer, f"__{_name}__", _operator(_name))
 for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
-    _method = lambda self, op=_op: _as_their_result(elementwise(self.graph, op, self), [self])  # noqa: E731
+    _method = lambda self, op=_op: _of_one(op, self)  # noqa: E731
     setattr(Tracer, f"__{_name}__", _method)
 for _name, _method in {
     "invert": _invert,

@@ -21,7 +21,7 @@ import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
-from .iterated import Loop, PassWriter
+from .iterated import NOTHING, Loop, PassWriter
 from .library.ordered import sorted_list
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
 from .operators import elementwise, is_numpys
@@ -253,6 +253,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
+        INSTEAD_NAME.format("nothing"): lambda: NOTHING,
         INSTEAD_NAME.format("none"): functools.partial(is_none, graph),
         INSTEAD_NAME.format("true"): _TruthType(graph, True),
         INSTEAD_NAME.format("false"): _TruthType(graph, False),

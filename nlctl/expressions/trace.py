@@ -212,8 +212,8 @@ def _guarded(graph: Graph, result: Tracer) -> Tracer:
 def _flat(graph: Graph, value: object) -> Tracer:
     """Return a function's result, an array, tuple, list or number, in one dimension."""
     if isinstance(value, tuple | list):
-        return concatenated(graph, [traced(graph, v).reshape(-1) for v in value])
-    return traced(graph, value).reshape(-1)
+        return concatenated(graph, [traced(graph, v).there().reshape(-1) for v in value])
+    return traced(graph, value).there().reshape(-1)
 
 
 _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le"}
