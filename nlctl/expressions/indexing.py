@@ -24,7 +24,12 @@ def _item(self: Tracer, key: Any) -> Any:
         return self.item_at(self.labels[key])
     if isinstance(key, Tracer) and _is_mask(key):
         return Masked(self, key)
-    if isinstance(key, tuple) and _is_mask(key[0]) and all(isinstance(k, int) for k in key[1:]):
+    if (
+        isinstance(key, tuple)
+        and key
+        and _is_mask(key[0])
+        and all(isinstance(k, int) for k in key[1:])
+    ):
         return Masked(self[(slice(None), *key[1:])], key[0])
     if isinstance(key, Tracer) and key.shape:
         items = [_item(self, k) for k in key.short().reshape(-1)]

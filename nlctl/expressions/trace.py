@@ -29,6 +29,7 @@ from .graph import (
     MessageWritten,
     Namespace,
     Untraceable,
+    catchable,
 )
 from .operators import elementwise
 from .rewritten import Unfollowed, is_raised
@@ -211,6 +212,8 @@ def _guarded(graph: Graph, result: Tracer) -> Tracer:
 
 def _flat(graph: Graph, value: object) -> Tracer:
     """Return a function's result, an array, tuple, list or number, in one dimension."""
+    if value is None and graph.decisions:  # what no case is for; python-control raises an error
+        raise catchable(TypeError)
     if isinstance(value, tuple | list):
         return concatenated(graph, [traced(graph, v).there().reshape(-1) for v in value])
     return traced(graph, value).there().reshape(-1)
