@@ -265,7 +265,7 @@ def _assigned(body: Sequence[ast.stmt]) -> tuple[list[str] | None, list[str]]:
 
 
 _MISSING = object()
-NOTHING = object()  # what a function returns that ends without saying so
+NOT_RETURNED = object()  # what a function returns that ends without saying so
 
 
 class Loop:
@@ -386,10 +386,10 @@ class Loop:
             guards = len(self.graph.guards)
             rest, value = self.results, other()
             self._guarded(guards, op("not", returned))
-            if value is NOTHING and any(isinstance(v, list | tuple) for _, v in rest):
+            if value is NOT_RETURNED and any(isinstance(v, list | tuple) for _, v in rest):
                 self.graph.guard(returned, TypeError)  # what is taken apart is not None
                 *rest, (_, value) = rest
-            value = None if value is NOTHING else value
+            value = None if value is NOT_RETURNED else value
         for condition, earlier in reversed(rest):
             value = self._selected(condition, earlier, value)
         return value

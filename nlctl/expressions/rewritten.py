@@ -13,7 +13,7 @@ import contextlib
 import copy
 import dis
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from types import CodeType, FunctionType, NoneType
 from typing import Any
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
-from .iterated import NOTHING, Loop, PassWriter
+from .iterated import NOT_RETURNED, Loop, PassWriter
 from .library.ordered import sorted_list
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
 from .operators import elementwise, is_numpys
@@ -32,8 +32,8 @@ _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
 _KEYS = (int, float, bool)
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
-          ast.Attribute, ast.With, ast.JoinedStr, ast.MatchSingleton, ast.Is,
-          ast.IsNot)  # fmt: skip
+          ast.Attribute, ast.With, ast.JoinedStr, ast.MatchSingleton, ast.MatchClass,
+          ast.Is, ast.IsNot)  # fmt: skip
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -45,16 +45,26 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
     except Unreadable:
         return function.__code__
     kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
-    if not kinds or not isinstance(tree, ast.FunctionDef):
-        return function.__code__
-    if "__class__" in function.__code__.co_freevars:  # only within a class it is what it is
-        if ast.Try in kinds:
-            raise Untraceable("try in a method that calls super()")
+    if "__class__" in function.__code__.co_freevars or not isinstance(tree, ast.FunctionDef):
+        _check_as_it_is(tree, kinds, merging)
+        return function.__code__  # (only within a class is ``__class__`` what it is)
+    if not kinds:
         return function.__code__
     body = _Rewriter(function.__globals__).visit(copy.deepcopy(tree))
     body = Merger().visit(PassWriter().visit(body)) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
+
+
+def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
+    """Check that a lambda, or a method that calls super(), has nothing to rewrite."""
+    where = "a lambda" if isinstance(tree, ast.Lambda) else "a method that calls super()"
+    if ast.Try in kinds:
+        raise Untraceable(f"try in {where}")
+    constants = {type(n.value) for n in ast.walk(tree) if isinstance(n, ast.Constant)}
+    is_asked = bool(kinds & {ast.Is, ast.IsNot}) and (merging or bool in constants)
+    if is_asked or kinds & {ast.MatchSingleton, ast.MatchClass}:
+        raise Untraceable(f"identity or a class in a pattern in {where}")
 
 
 _FOLLOWED = "followed_function"
@@ -168,6 +178,10 @@ class _Rewriter(ast.NodeTransformer):
         kind = ast.MatchClass(ast.Name(name, ast.Load()), [], [], [])
         return ast.copy_location(kind, node)
 
+    def visit_MatchClass(self, node: ast.MatchClass) -> Any:
+        """Refuse: what stands for an object of somebody's is none of its class."""
+        raise Untraceable("a class in a pattern")
+
     def visit_Compare(self, node: ast.Compare) -> Any:
         """Ask by a function whether something is True, False or None."""
         self.generic_visit(node)
@@ -253,7 +267,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
-        INSTEAD_NAME.format("nothing"): lambda: NOTHING,
+        INSTEAD_NAME.format("nothing"): lambda: NOT_RETURNED,
         INSTEAD_NAME.format("none"): functools.partial(is_none, graph),
         INSTEAD_NAME.format("true"): _TruthType(graph, True),
         INSTEAD_NAME.format("false"): _TruthType(graph, False),

@@ -187,3 +187,60 @@ def _false(t, x, u, params):
             return [1.0]
         case _:
             return [2.0]
+
+
+class Law:
+    """A law whose heirs ask for identity."""
+
+    def value(self, v):
+        return v
+
+
+class Heir(Law):
+    """Asks after a branch, in which names have come together."""
+
+    def value(self, v, sign=None):
+        if sign is True:
+            return super().value(v)
+        return -super().value(v)
+
+
+HEIR = Heir()
+
+
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_what_cannot_be_asked_on_expressions_is_called(above):
+    """Words that stay as they are: of a lambda, of a method that calls super(), of a class."""
+    for source in (
+        lambda t, x, u, params: [1.0 if (float(x[0]) > 1.0) is True else 2.0],
+        lambda t, x, u, params: [HEIR.value(x[0], float(x[0]) > 1.0)],
+        _by_class,
+    ):
+        system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
+        compiled = nlctl.compile(system)
+        assert compiled.equations.calls
+        assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+def _by_class(t, x, u, params):
+    match SETTINGS:
+        case Settings(gain=k):
+            return [k * x[0]]
+    return [0.0]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_where_nan_is_sorted_the_function_is_called():
+    """Seven in order, x' = -x: where NaN ends up only Python says."""
+
+    def update(t, x, u, params):
+        first, *_ = sorted([*(v + k for k, v in enumerate(x)), np.sqrt(u[0])])
+        return [-v if first < 9.0 else v for v in x]
+
+    system = ct.nlsys(update, None, states=6, inputs=1, outputs=6)
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    response = nlctl.input_output_response(compiled, [0.0, 1.0], 2.0, np.ones(6))
+    np.testing.assert_allclose(response.outputs[:, -1], np.exp(-1), rtol=1e-6)
+    called = nlctl.input_output_response(compiled, [0.0, 1.0], -1.0, np.ones(6))
+    np.testing.assert_allclose(called.outputs[:, -1], np.exp(-1), rtol=1e-6)

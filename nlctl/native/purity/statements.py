@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import ast
 import contextlib
 import importlib
@@ -31,6 +32,7 @@ from .values import (
     forgotten,
     holder,
     least_upper_bound,
+    library,
 )
 from .walk import Walk
 
@@ -199,10 +201,18 @@ class CallWalker(Expressions):
                 if isinstance(part, ast.MatchSingleton) and part.value is not None:
                     self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
                 if isinstance(part, ast.MatchClass):
-                    self.generic_visit(part)
+                    self.check_pattern(part)
             if case.guard is not None:
                 self.visit(case.guard)
         self.either([case.body for case in node.cases] + [[]])
+
+    def check_pattern(self, pattern: ast.MatchClass) -> None:
+        """Check that a pattern asks for somebody's class and reads its attributes alone."""
+        cls = self.visit(pattern.cls).known
+        plain = isinstance(cls, type) and library(cls) is None and type(cls) in (type, abc.ABCMeta)
+        names = (*pattern.kwd_attrs, *getattr(cls, "__match_args__", ())) if plain else ()
+        if not plain or any(isinstance(getattr(cls, name, None), property) for name in names):
+            self.generic_visit(pattern)  # which says that it is not known
 
     def visit_Assert(self, node: ast.Assert) -> None:
         self.visit(node.test)
@@ -316,5 +326,5 @@ def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]
 
 def merged(ends: Sequence[dict[str, KnownValue]]) -> dict[str, KnownValue]:
     """Return what is known after one of several ways."""
-    names = {name for end in ends for name in end}
+    names = dict.fromkeys(name for end in ends for name in end)  # in order: super() asks the first
     return {name: least_upper_bound([end[name] for end in ends if name in end]) for name in names}
