@@ -250,7 +250,7 @@ def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[],
 
 
 def _number(_: Graph, value: Any) -> Any:
-    """Return a number that another replaces; an array is changed, and whoever else has it sees."""
+    """Return a number, which another replaces; an array would change under all its names."""
     if np.ndim(value) if not isinstance(value, Tracer) else value.where_there().shape:
         raise Untraceable("an array that is changed where a condition holds")
     return value

@@ -57,8 +57,8 @@ def _is_plain(base: Any) -> bool:
     of_python = getattr(base, "__module__", "") in ("enum", "typing", "abc")
     if of_python or not isinstance(base, type):
         return of_python and base is not typing.Generic
-    own = inspect.getattr_static(base, "__init_subclass__")
-    begins = own is inspect.getattr_static(object, "__init_subclass__")
+    beginning = inspect.getattr_static(base, "__init_subclass__")
+    begins = beginning is inspect.getattr_static(object, "__init_subclass__")
     return begins and type(base) in (type, abc.ABCMeta)
 
 
