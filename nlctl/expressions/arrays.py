@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -74,9 +74,11 @@ class Tracer:
     origin: tuple[Tracer, int] | None = None
     place: range | None = None  # where in the origin a part of one dimension lies
     version: int = 0  # how often a long array has been assigned to
-    # elements of which this long array was made as another shape, and what they were then
-    watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
+    # elements of which this was made, as another shape or as a choice, and what they were then
+    watched: tuple[tuple[np.ndarray, tuple[Expr, ...]], ...] = ()
+    missing: Expr | None = None  # where this is None, as it was before something was chosen
     is_pythons: bool = False  # whether it is known to be a number of Python's own, not NumPy's
+    is_column: bool = False  # whether it is a column of a table of pandas
     labels: Mapping[str, int] = field(default_factory=dict)  # of a column of pandas: where each is
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
@@ -110,9 +112,11 @@ class Tracer:
     @property
     def cells(self) -> np.ndarray:
         """The expressions."""
+        if self.missing is not None and self.graph.decisions.get(self.missing) is not False:
+            raise Untraceable("what may be None")
         if self.origin is not None and self.origin[0].version != self.origin[1]:
             raise Untraceable("part of an array that has been assigned to since")
-        if self.watched is not None and tuple(self.watched[0].flat) != self.watched[1]:
+        if self.watched and any(tuple(elements.flat) != then for elements, then in self.watched):
             raise Untraceable("another shape of an array that has been assigned to since")
         return self.values
 
@@ -165,7 +169,7 @@ class Tracer:
     ) -> Tracer:
         """Return a view of this array, or of what this is a part of."""
         origin = self.origin or ((self, self.version) if self.axis is not None else None)
-        return Tracer(self.graph, cells, axis, length, origin, place)
+        return Tracer(self.graph, cells, axis, length, origin, place, watched=self.watched)
 
     def _text(self, *_: object) -> str:
         raise Untraceable("a text of what is only known when it runs")
@@ -285,8 +289,22 @@ class Tracer:
         """Return elements of a small matrix as a long array of one dimension."""
         pieces = [(e, 1) for e in self.cells.flat]
         array = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
-        array.watched = (self.values, tuple(self.values.flat))
+        array.watched = (self.watch(),)
         return array
+
+    def where_there(self) -> Tracer:
+        """Return the array as it is where it is not None."""
+        return self if self.missing is None else replace(self, missing=None)
+
+    def there(self) -> Tracer:
+        """Return the array: where it is None, Python raises an error."""
+        if self.missing is not None:
+            self.graph.guard(self.graph.op("not", self.missing), TypeError)
+        return self.where_there()
+
+    def watch(self) -> tuple[np.ndarray, tuple[Expr, ...]]:
+        """Return the elements with what they are now: whether they are assigned to later."""
+        return self.values, tuple(self.values.flat)
 
     def pieces(self) -> list[tuple[Expr, int]]:
         """Return the elements in order, each expression with its number of elements."""

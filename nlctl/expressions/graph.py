@@ -140,19 +140,13 @@ class MessageWritten(Untraceable):
     """A way through a function writes a message."""
 
 
-class OpenCondition(BaseException):  # (what is traced may catch exceptions)
-    """A function asks whether a condition holds that is not known when it is traced."""
-
-    def __init__(self, condition: Expr) -> None:
-        self.condition = condition
-
-
 class Graph:
     """All expressions of a diagram."""
 
     def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
         self.settles = False  # whether conditions of parameters that are integers are decided
+        self.merges = False  # whether choices of numbers are followed at once, not way by way
         self.limit = UNLIMITED  # largest number of expressions for now
         # sizes of the arrays that are read, as far as known: nothing is read beyond
         self.lengths = dict(lengths or {})
@@ -166,6 +160,7 @@ class Graph:
         self.mixed: set[Expr] = set()
         # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
+        self.answers: Callable[[Expr], bool] | None = None  # what decides of the rest
         self.implied: dict[Expr, bool] = {}  # what follows from that
         # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
@@ -188,7 +183,9 @@ class Graph:
                 for integer in condition.args:
                     self.assumed(integer)
                 return bool(numpy_function(condition.op)(*values))
-            raise OpenCondition(condition)
+            if self.answers is None:
+                raise Untraceable("a condition that is only known when it runs")
+            self.decisions[condition] = self.answers(condition)
         return self.decisions[condition]
 
     def guard(self, condition: Expr, error: type[Exception]) -> None:

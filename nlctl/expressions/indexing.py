@@ -19,11 +19,18 @@ GATHERED = 64  # places among which an integer may choose
 
 def _item(self: Tracer, key: Any) -> Any:
     """Return elements; those of a mask, or at a place that the state decides, as choices."""
-    key = _settled(key)
+    self, key = self.there(), _settled(key)
     if isinstance(key, str) and key in self.labels:
         return self.item_at(self.labels[key])
     if isinstance(key, Tracer) and _is_mask(key):
         return Masked(self, key)
+    if (
+        isinstance(key, tuple)
+        and key
+        and _is_mask(key[0])
+        and all(isinstance(k, int) for k in key[1:])
+    ):
+        return Masked(self[(slice(None), *key[1:])], key[0])
     if isinstance(key, Tracer) and key.shape:
         items = [_item(self, k) for k in key.short().reshape(-1)]
         return traced(self.graph, items).reshape(key.shape + self.shape[1:])
@@ -140,7 +147,7 @@ def _assign(self: Tracer, key: Any, value: object) -> None:
         return _scattered(self, key, place, value)
     value = traced(self.graph, value)
     _check_kinds(self, value)
-    if self.watched is not None:
+    if self.watched:
         raise Untraceable("assignment to another shape of an array")
     if holds_arrays(key):
         return _assign_at(self, key, value)

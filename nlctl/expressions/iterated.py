@@ -46,6 +46,8 @@ class PassWriter(ast.NodeTransformer):
             if isinstance(statement, ast.For | ast.While) and _leaves(statement, ast.Return):
                 if len(rest) > 1 or not all(isinstance(s, ast.Return | ast.Raise) for s in rest):
                     break
+                if not rest and not _is_endless(statement):
+                    rest = [ast.Return(call_instead("nothing"))]
                 written = self._loop(statement, rest)
                 node.body[place:] = written or node.body[place:]
                 break
@@ -181,6 +183,11 @@ def _statements(body: Sequence[ast.stmt], *, loops: bool = False) -> Iterable[as
                 yield from _statements(getattr(statement, field, None) or (), loops=loops)
 
 
+def _is_endless(node: ast.For | ast.While) -> bool:
+    """Whether a loop is left by its statements alone."""
+    return isinstance(node, ast.While) and isinstance(node.test, ast.Constant)
+
+
 def _leaves(node: ast.For | ast.While, kind: type[ast.stmt]) -> bool:
     """Whether a loop has a ``break`` of its own, or returns from anywhere in it."""
     every = _statements(node.body, loops=kind is ast.Return)
@@ -258,6 +265,7 @@ def _assigned(body: Sequence[ast.stmt]) -> tuple[list[str] | None, list[str]]:
 
 
 _MISSING = object()
+NOT_RETURNED = object()  # what a function returns that ends without saying so
 
 
 class Loop:
@@ -378,6 +386,10 @@ class Loop:
             guards = len(self.graph.guards)
             rest, value = self.results, other()
             self._guarded(guards, op("not", returned))
+            if value is NOT_RETURNED and any(isinstance(v, list | tuple) for _, v in rest):
+                self.graph.guard(returned, TypeError)  # what is taken apart is not None
+                *rest, (_, value) = rest
+            value = None if value is NOT_RETURNED else value
         for condition, earlier in reversed(rest):
             value = self._selected(condition, earlier, value)
         return value
@@ -416,9 +428,8 @@ class Loop:
 
     def _either(self, now: Any, before: Any) -> Any:
         if before is _MISSING:
-            is_truth = (
-                isinstance(now, Tracer) and now.only.kind == "b" if np.size(now) == 1 else False
-            )
+            single = isinstance(now, Tracer) and now.size == 1
+            is_truth = single and now.where_there().only.kind == "b"
             before = now if is_truth else np.nan
         return self._selected(self.running, now, before)
 
@@ -429,7 +440,7 @@ class Loop:
             parts = [self._selected(condition, a, b) for a, b in zip(one, other, strict=True)]
             return type(one)(parts)
         numbers = Tracer | bool | int | float | np.generic
-        if isinstance(one, numbers) and isinstance(other, numbers):
+        if all(isinstance(v, numbers) or v is None for v in (one, other)):
             return chosen(self.graph, condition, one, other)
         if type(one) is type(other) and isinstance(one, str | None) and one == other:
             return one
@@ -445,6 +456,7 @@ def _copied(value: Any) -> Any:
 def _content(value: Any, depth: int = 3) -> Any:
     """Return something that is another when a value has been written into."""
     if isinstance(value, Tracer):
+        value = value.where_there()
         return tuple(map(id, value.elements().flat)) if value.shape else id(value.only)
     if not depth or isinstance(value, Loop | type):
         return id(value)

@@ -13,11 +13,14 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from .arrays import Tracer, scalar, traced
+import numpy as np
+
+from .arrays import Tracer, mapped, python_number, scalar, traced
 from .graph import Expr, Graph, Untraceable
 from .operators import elementwise
 
 INSTEAD_NAME = "{}@traced"  # of what stands for statements: no name that anybody has
+QUESTIONS = ("truth", "none")  # what is asked by functions instead of ``is``
 _BINDING = (ast.NamedExpr, ast.Yield, ast.YieldFrom, ast.Await)
 _Values = dict[str, tuple[ast.expr, ast.expr]]  # of what is assigned: where, and what
 
@@ -47,7 +50,7 @@ class Merger(ast.NodeTransformer):
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """Ask comparisons without a decision; of other values one of them is the result."""
         self.generic_visit(node)
-        return truth_test(node) if all(isinstance(v, ast.Compare) for v in node.values) else node
+        return truth_test(node) if all(map(_is_question, node.values)) else node
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
@@ -73,6 +76,15 @@ class Merger(ast.NodeTransformer):
         whole = [question, ast.Assign([ast.Name(result, ast.Store())], picked),
                  ast.If(is_missing, [node], [stored])]  # fmt: skip
         return [ast.copy_location(ast.fix_missing_locations(_placed(s, node)), node) for s in whole]
+
+
+def _is_question(node: ast.expr) -> bool:
+    """Whether the value of an expression is True or False."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return _is_question(node.operand)
+    asked = [INSTEAD_NAME.format(name) for name in QUESTIONS]
+    by_name = isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    return isinstance(node, ast.Compare) or (by_name and node.func.id in asked)  # type: ignore[union-attr]
 
 
 def _returned(body: Sequence[ast.stmt]) -> ast.expr | None:
@@ -152,7 +164,10 @@ def _one(statement: ast.stmt) -> _Values | None:
             return _at_once(target.elts, value.elts)
     elif isinstance(statement, ast.AugAssign):
         target = statement.target
-        value = ast.BinOp(_as_read(target), statement.op, statement.value)
+        before = _as_read(target)
+        if isinstance(target, ast.Name):
+            before = call_instead("number", before)
+        value = ast.BinOp(before, statement.op, statement.value)
     else:
         return None
     plain = isinstance(target, ast.Name | ast.Subscript)
@@ -207,7 +222,7 @@ def call_instead(name: str, *given: ast.expr) -> ast.Call:
 def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that `Merger` writes."""
     functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite,
-                 "fails": _fails}  # fmt: skip
+                 "fails": _fails, "number": _number}  # fmt: skip
     return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
@@ -232,6 +247,13 @@ def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[],
     if both is None:
         return yes() if test else no()
     return both[0]
+
+
+def _number(_: Graph, value: Any) -> Any:
+    """Return a number, which another replaces; an array would change under all its names."""
+    if np.ndim(value) if not isinstance(value, Tracer) else value.where_there().shape:
+        raise Untraceable("an array that is changed where a condition holds")
+    return value
 
 
 def _fails(graph: Graph, test: object) -> Any:
@@ -268,7 +290,11 @@ def _opposite(graph: Graph, value: object) -> Any:
 
 def truth_value(graph: Graph, value: object) -> Any:
     """Return the truth of a number."""
-    number = traced(graph, value)
+    number, nowhere = _whether_missing(graph, value)
+    assert number is not None
+    if nowhere.op != "const":
+        there = scalar(graph, graph.op("not", nowhere))
+        return elementwise(graph, "and", there, truth_value(graph, number))
     return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
 
 
@@ -291,13 +317,46 @@ def _under(graph: Graph, condition: Expr, holds: bool, branch: Callable[[], Any]
     return values
 
 
-def chosen(graph: Graph, condition: Expr, one: object, other: object) -> Tracer:
+def chosen(graph: Graph, condition: Expr, one: object, other: object) -> Any:
     """Return one number or array where a condition holds, another elsewhere."""
-    a, b = traced(graph, one), traced(graph, other)
-    kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()
-    if not kinds or ("b" in kinds and len(kinds) > 1):
+    if one is other:
+        return one
+    (a, a_missing), (b, b_missing) = (_whether_missing(graph, v) for v in (one, other))
+    a, b = _nothing_like(b) if a is None else a, _nothing_like(a) if b is None else b
+    if a is None or b is None or a.shape != b.shape:
+        raise Untraceable("branches with something else than numbers")
+    kinds = {e.kind for v in (a, b) for e in v.values.flat}
+    is_part = any(v.axis is not None or v.origin is not None for v in (a, b))
+    if is_part or (len(kinds) > 1 and ("b" in kinds or a.shape)):
         raise Untraceable("branches with something else than numbers")
     result = elementwise(graph, "select", scalar(graph, condition), a, b)
-    if len(kinds) > 1:
+    if a.shape:  # another array: what is assigned to any of them is not followed
+        result.watched = (*a.watched, *b.watched, a.watch(), b.watch())
+    elif len(kinds) > 1:
         graph.mixed.add(result.only)
+    missing = graph.op("select", condition, a_missing, b_missing)
+    result.missing = None if missing.op == "const" and not missing.data else missing
     return result
+
+
+def _whether_missing(graph: Graph, value: object) -> tuple[Tracer | None, Expr]:
+    """Return what is chosen, None if it is nothing yet, and where it is None."""
+    if value is None:
+        return None, graph.const(True)
+    array = traced(graph, value)
+    return array.where_there(), array.missing or graph.const(False)
+
+
+def _nothing_like(array: Tracer | None) -> Any:
+    """Return NaN in the shape of an array, in place of None."""
+    if array is None or any(e.kind == "b" for e in array.values.flat):
+        return None
+    number = array.graph.const(0 if all(e.kind == "i" for e in array.values.flat) else np.nan)
+    return Tracer(array.graph, mapped(lambda _: number, array.values), array.axis, array.length)
+
+
+def is_none(graph: Graph, value: object) -> Any:
+    """Return whether something is None, which a choice may be in some places."""
+    if isinstance(value, Tracer) and value.missing is not None:
+        return python_number(graph, value.missing)
+    return value is None

@@ -10,6 +10,7 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Collection, Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -53,10 +54,26 @@ def _of_node(node: Expr, ranges: dict[Expr, _Range]) -> _Range:
         return float(node.value), float(node.value)
     parts = [ranges[arg] for arg in node.args]
     if node.op == "select":
+        parts = [_where(node, i, part, ranges) for i, part in enumerate(parts)]
         return min(parts[1][0], parts[2][0]), max(parts[1][1], parts[2][1])
     if node.op == "remainder" and parts[1][0] == parts[1][1] > 0:
         return 0.0, parts[1][0] - (1.0 if node.kind == "i" else 0.0)
     return _RULES[node.op](*parts) if node.op in _RULES else _EVERYTHING
+
+
+_ABOVE = {"gt": True, "ge": True, "lt": False, "le": False}
+
+
+def _where(node: Expr, place: int, within: _Range, ranges: dict[Expr, _Range]) -> _Range:
+    """Return bounds of what a choice takes where it does so because of its size."""
+    condition, (low, high) = node.args[0], within
+    if condition.op not in _ABOVE or node.args[place] not in condition.args:
+        return within
+    is_left = node.args[place] is condition.args[0]
+    limit = condition.args[is_left]
+    end = (float(limit.data),) * 2 if limit.op == "const" else ranges.get(limit, _EVERYTHING)
+    is_above = _ABOVE[condition.op] == (is_left == (place == 1))
+    return (max(low, end[0]), high) if is_above else (low, min(high, end[1]))
 
 
 def _product(a: _Range, b: _Range) -> _Range:
@@ -85,6 +102,7 @@ _RULES = {
 }  # fmt: skip
 
 
+NO_INTEGER = -(2.0**63)  # what NumPy casts NaN to, and what is too large for an integer
 _FOLLOWED = 16  # values of an integer, each a way through a function
 
 
@@ -161,10 +179,11 @@ def product(a: Tracer, b: Tracer) -> Tracer:
 
 
 def _matrix_product(graph: Graph, a: object, b: object) -> Any:
+    a, b = (v.there() if isinstance(v, Tracer) else v for v in (a, b))
     if is_complex(a) or is_complex(b):
         assert Special.of_complex is not None
         return Special.of_complex(graph, a) @ b
-    if isinstance(a, Special) or isinstance(b, Special):
+    if any(isinstance(v, Special) or hasattr(type(v), "_forwards") for v in (a, b)):
         return NotImplemented
     return product(traced(graph, a), traced(graph, b))
 
@@ -182,6 +201,8 @@ def _batched(a: Tracer, b: Tracer) -> Tracer:
 def _truth(self: Tracer) -> bool:
     if self.size != 1 or self.axis is not None:
         raise Untraceable("the truth value of an array")
+    if self.missing is not None and self.graph.decided(self.missing):
+        return False
     condition = self.graph.op("ne", self.only, self.graph.const(0.0))
     return self.graph.decided(self.only if self.only.kind == "b" else condition)
 
@@ -211,10 +232,13 @@ def _integer(self: Tracer) -> int:
         raise Untraceable("an integer that depends on the state")
     if self.only.value is not None:
         return self.graph.assumed(self.only)
-    low, high = integer_range(self.only)
+    number, beyond = self.only, []
+    if number.op == "select" and number.args[2].data == NO_INTEGER:
+        number, beyond = number.args[1], [int(NO_INTEGER)]  # of NaN, what NumPy makes of it
+    low, high = integer_range(number)
     if high - low >= _FOLLOWED:
         raise Untraceable("an integer that may have too many values")
-    values = range(int(low), int(high) + 1)
+    values = [*range(int(low), int(high) + 1), *beyond]
     equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
     decided = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
     self.graph.implied.update({equal[k]: k == decided for k in values})
@@ -300,6 +324,7 @@ def _is_integer(value: object) -> bool:
 
 def _power(base: Any, exponent: Any) -> Any:
     """Return a power: with a whole exponent, known or assumed, as products."""
+    base, exponent = (v.there() if isinstance(v, Tracer) else v for v in (base, exponent))
     if _is_integer(exponent) and exponent.only.value is not None:
         exponent = _integer(exponent)
     if isinstance(exponent, float) and exponent.is_integer():
@@ -321,8 +346,22 @@ _OF_BITS: dict[str, Callable[..., Any]] = dict.fromkeys(("and", "or", "xor"), bi
 _OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
 
 
+def _is_none_here(value: object) -> bool:
+    """Whether a number that may be None is so on this way."""
+    if not isinstance(value, Tracer) or value.missing is None:
+        return False
+    if value.where_there().shape:
+        raise Untraceable("comparison of what may be None or an array")
+    return value.graph.decided(value.missing)
+
+
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
+        if name in ("eq", "ne") and any(map(_is_none_here, (self, other))):  # no error of None
+            return name == "ne"
+        self, other = self.there(), other.there() if isinstance(other, Tracer) else other
+        if type(other) is Fraction and not self.shape and self.only.kind == "f":
+            other = float(other) if name in _BINARY.values() else other  # as Python does it
         row = bool(self.shape) and isinstance(other, list | tuple)
         if not (row or isinstance(other, _OPERANDS)):
             if name in ("eq", "ne"):
@@ -407,6 +446,11 @@ def _shift(way: int, swapped: bool) -> Callable[[Tracer, object], Any]:
     return method
 
 
+def _of_one(name: str, value: Tracer) -> Tracer:
+    """Return an operation on one number or array."""
+    return _as_their_result(elementwise(value.graph, name, value.there()), [value])
+
+
 _BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
 for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
     setattr(Tracer, f"__{_name}__", _operator(_op))
@@ -415,7 +459,7 @@ for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Tracer, f"__{_name}__", _operator(_name))
 for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
-    _method = lambda self, op=_op: _as_their_result(elementwise(self.graph, op, self), [self])  # noqa: E731
+    _method = lambda self, op=_op: _of_one(op, self)  # noqa: E731
     setattr(Tracer, f"__{_name}__", _method)
 for _name, _method in {
     "invert": _invert,

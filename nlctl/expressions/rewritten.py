@@ -13,17 +13,18 @@ import contextlib
 import copy
 import dis
 import functools
-from collections.abc import Callable, Mapping
-from types import CodeType, FunctionType
+from collections.abc import Callable, Mapping, Set
+from types import CodeType, FunctionType, NoneType
 from typing import Any
 
 import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
-from .iterated import Loop, PassWriter
-from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
-from .operators import elementwise
+from .iterated import NOT_RETURNED, Loop, PassWriter
+from .library.ordered import sorted_list
+from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
+from .operators import elementwise, is_numpys
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
@@ -31,7 +32,8 @@ _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
 _KEYS = (int, float, bool)
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
-          ast.Attribute, ast.With, ast.JoinedStr)  # fmt: skip
+          ast.Attribute, ast.With, ast.JoinedStr, ast.MatchSingleton, ast.MatchClass,
+          ast.Is, ast.IsNot)  # fmt: skip
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -43,16 +45,26 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
     except Unreadable:
         return function.__code__
     kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
-    if not kinds or not isinstance(tree, ast.FunctionDef):
-        return function.__code__
-    if "__class__" in function.__code__.co_freevars:  # only within a class it is what it is
-        if ast.Try in kinds:
-            raise Untraceable("try in a method that calls super()")
+    if "__class__" in function.__code__.co_freevars or not isinstance(tree, ast.FunctionDef):
+        _check_as_it_is(tree, kinds, merging)
+        return function.__code__  # (only within a class is ``__class__`` what it is)
+    if not kinds:
         return function.__code__
     body = _Rewriter(function.__globals__).visit(copy.deepcopy(tree))
     body = Merger().visit(PassWriter().visit(body)) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
+
+
+def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
+    """Check that a lambda, or a method that calls super(), has nothing to rewrite."""
+    where = "a lambda" if isinstance(tree, ast.Lambda) else "a method that calls super()"
+    if ast.Try in kinds:
+        raise Untraceable(f"try in {where}")
+    constants = {type(n.value) for n in ast.walk(tree) if isinstance(n, ast.Constant)}
+    is_asked = bool(kinds & {ast.Is, ast.IsNot}) and (merging or bool in constants)
+    if is_asked or kinds & {ast.MatchSingleton, ast.MatchClass}:
+        raise Untraceable(f"identity or a class in a pattern in {where}")
 
 
 _FOLLOWED = "followed_function"
@@ -150,10 +162,38 @@ class _Rewriter(ast.NodeTransformer):
             node.func = func
         else:
             self.generic_visit(node)
-        plain = len(node.args) == 1 and not node.keywords and isinstance(node.func, ast.Attribute)
-        if not plain or node.func.attr != "index":  # type: ignore[attr-defined]
+        if not isinstance(node.func, ast.Attribute) or node.func.attr not in ("index", "sort"):
             return node
-        return call_instead("index", node.func.value, *node.args)  # type: ignore[attr-defined]
+        if node.func.attr == "index" and (len(node.args) != 1 or node.keywords):
+            return node
+        instead = call_instead(node.func.attr, node.func.value, *node.args)
+        instead.keywords = node.keywords
+        return instead
+
+    def visit_MatchSingleton(self, node: ast.MatchSingleton) -> Any:
+        """Write a class that True, or False, is the only object of."""
+        if node.value is None:
+            return node
+        name = INSTEAD_NAME.format(str(node.value).lower())
+        kind = ast.MatchClass(ast.Name(name, ast.Load()), [], [], [])
+        return ast.copy_location(kind, node)
+
+    def visit_MatchClass(self, node: ast.MatchClass) -> Any:
+        """Refuse: what stands for an object of somebody's is none of its class."""
+        raise Untraceable("a class in a pattern")
+
+    def visit_Compare(self, node: ast.Compare) -> Any:
+        """Ask by a function whether something is True, False or None."""
+        self.generic_visit(node)
+        other = node.comparators[0]
+        is_asked = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
+        if not (is_asked and isinstance(other, ast.Constant)):
+            return node
+        if type(other.value) not in (bool, NoneType):
+            return node
+        none = call_instead("none", node.left)
+        answer = none if other.value is None else call_instead("truth", other, node.left)
+        return answer if isinstance(node.ops[0], ast.Is) else ast.UnaryOp(ast.Not(), answer)
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -226,6 +266,12 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
+        INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
+        INSTEAD_NAME.format("nothing"): lambda: NOT_RETURNED,
+        INSTEAD_NAME.format("none"): functools.partial(is_none, graph),
+        INSTEAD_NAME.format("true"): _TruthType(graph, True),
+        INSTEAD_NAME.format("false"): _TruthType(graph, False),
+        INSTEAD_NAME.format("sort"): functools.partial(sorted_list, graph),
         INSTEAD_NAME.format("values"): lambda v: v if isinstance(v, Tracer) else v.values,
     }
 
@@ -319,6 +365,31 @@ def _index(whole: Any, value: Any) -> Any:
         if v is value or v == value:
             return k
     raise catchable(ValueError)
+
+
+def _is_truth(graph: Graph, value: bool, thing: Any) -> bool:
+    """Return whether a thing is True, or is False: a truth value of NumPy's is neither."""
+    if not isinstance(thing, Tracer):
+        return thing is value
+    is_parameter = not thing.shape and thing.only.op == "leaf" and thing.only.data[0] == "p"
+    if not is_parameter and (thing.shape or thing.only.kind != "b" or is_numpys(graph, thing)):
+        return False
+    if not thing.is_pythons:
+        raise Untraceable("identity of what may be Python's True or NumPy's")
+    return bool(thing) is value
+
+
+class _TruthType(type):
+    """A class for patterns, of which True or False is the only object."""
+
+    def __new__(cls, graph: Graph, value: bool) -> Any:
+        return super().__new__(cls, str(value), (), {"of": (graph, value)})
+
+    def __init__(cls, *_: object) -> None:
+        super().__init__(cls)
+
+    def __instancecheck__(cls, thing: Any) -> bool:
+        return _is_truth(*cls.of, thing)  # type: ignore[attr-defined]
 
 
 class NumberKeys(dict[Any, Any]):

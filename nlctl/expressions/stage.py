@@ -16,6 +16,7 @@ import functools
 import inspect
 import logging
 import math
+import typing
 import warnings
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -154,6 +155,8 @@ class Stage:
     def _column(self, value: Any) -> Any:
         """Return a column of numbers of pandas: an array, and by labels its elements."""
         array = self.fresh(np.array(value, dtype=float))
+        if isinstance(array, Tracer):
+            array.is_column = hasattr(value, "iloc")
         if isinstance(array, Tracer) and hasattr(value, "index") and value.index.is_unique:
             array.labels = {k: i for i, k in enumerate(value.index) if isinstance(k, str)}
         return array
@@ -192,7 +195,7 @@ class Stage:
         if is_dispatcher(value):
             return functools.partial(self._dispatched, value)
         if isinstance(value, CPUDispatcher | FunctionType):
-            if value in (dataclasses.dataclass, collections.namedtuple):
+            if value in (dataclasses.dataclass, collections.namedtuple, typing.NamedTuple):
                 return value  # they look at types, defaults and names alone
             if staged.is_of_a_library(value):
                 return self._library("", value)

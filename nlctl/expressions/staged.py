@@ -15,6 +15,8 @@ import numpy as np
 from .arrays import Special, Tracer, traced
 from .graph import Graph, MessageWritten, Untraceable
 from .library.rotations import enter_rotations
+from .library.rows import chosen_rows, is_table
+from .library.sparse import is_sparse, product_of
 from .library.table import (
     UFUNC_OPERATIONS,
     WRITTEN,
@@ -25,7 +27,7 @@ from .library.table import (
 )
 from .operators import elementwise
 
-LIBRARIES = ("numpy", "scipy", "numba", "pandas")
+LIBRARIES = ("numpy", "scipy", "numba", "pandas", "json", "re")
 
 
 _PLACES = ("loc", "iloc", "at", "iat")  # of a table of pandas: what is indexed
@@ -45,6 +47,9 @@ class OnStage(Protocol):
 
     def instead(self, value: object) -> Any:
         """Return what stands for a value that was there before."""
+
+    def fresh(self, value: Any) -> Any:
+        """Return constants that a library has made: arrays as those of expressions."""
 
     def for_numbers(self, real: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that takes constants, and refuses tracers."""
@@ -152,6 +157,8 @@ class StagedObject:
             return functools.partial(stage.copied(attribute), self)
         if name == "ev" and is_of_a_library(real):  # a spline of two variables, point by point
             return functools.partial(self, grid=False)
+        if name == "dot" and is_sparse(real):
+            return functools.partial(_operated, self, "dot")
         if name in _PLACES and is_of_a_library(real):
             return StagedObject(getattr(real, name), stage)
         written = WRITTEN.get((type(real).__name__, name)) if is_of_a_library(real) else None
@@ -184,13 +191,30 @@ def _forwarded(name: str) -> Callable[..., Any]:
             return len(real)
         if name == "__len__":  # as Python says; list() asks, and takes it for an answer
             raise TypeError(f"object of type {type(real).__name__} has no len()")
+        if name == "__getitem__" and is_table(real) and holds_tracers(settled(rest[0])):
+            return chosen_rows(stage.graph, real, rest[0])
         if name == "__getitem__" and hasattr(real, "__getitem__"):
             return stage.instead(real[settled(rest[0])])
         if name == "__bool__":
             return bool(real)
+        if len(rest) == 1 and is_of_a_library(real):
+            return _operated(self, name, rest[0])
         raise Untraceable(f"{name} of an object of {type(real).__name__}")
 
     return method
+
+
+def _operated(thing: StagedObject, name: str, other: Any) -> Any:
+    """Return what an operator of an object of a library makes of another operand."""
+    real, stage = thing.__dict__["_real"], thing.__dict__["_stage"]
+    known = settled(other)
+    if not holds_tracers(known) and hasattr(real, name):
+        result = getattr(real, name)(known)
+        if result is not NotImplemented:
+            return stage.fresh(result)
+    if not is_sparse(real):
+        raise Untraceable(f"{name} of an object of {type(real).__name__}")
+    return product_of(stage.graph, real, name, other)
 
 
 for _name in ("add", "sub", "mul", "truediv", "matmul", "pow", "mod", "floordiv"):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import math
+import random
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -27,8 +28,8 @@ from .graph import (
     Graph,
     MessageWritten,
     Namespace,
-    OpenCondition,
     Untraceable,
+    catchable,
 )
 from .operators import elementwise
 from .rewritten import Unfollowed, is_raised
@@ -36,6 +37,7 @@ from .stage import Stage
 from .staged import LIBRARIES
 
 PATHS = 128  # paths through one function that are followed
+_UNLIKELY = 1e-3  # probability below which something is taken not to be so
 _FEW, _DEEP = 6, 8  # paths, and decisions on one, up to which no branch becomes a choice
 
 
@@ -77,7 +79,7 @@ def _traced(
 ) -> Tracer:  # fmt: skip
     """Follow every way; with `merging`, branches that only compute numbers are one."""
     graph.limit = len(graph.nodes) + BUDGET * (1 + merging)  # passes of loops are alike
-    assumptions = dict(graph.assumptions)
+    assumptions, graph.merges = dict(graph.assumptions), merging
     try:
         stage = Stage(graph, merging=merging)
         copy = stage.copied(function)
@@ -94,35 +96,79 @@ def _traced(
         raise Untraceable(f"{text}{_place(error)}") from error
     finally:
         graph.decisions, graph.implied, graph.guards, graph.attempts = {}, {}, [], 0
-        graph.limit = UNLIMITED
+        graph.limit, graph.merges, graph.answers = UNLIMITED, False, None
 
 
 def _followed(
-    graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
+    graph: Graph, run: Callable[[], Tracer], known: dict[Expr, bool], left: list[int]
 ) -> Tracer | None:
-    """Follow a function from where the decisions have led; None where it raises an error."""
+    """Follow a function from where decisions have led; None where it raises an error."""
+    asked: list[Expr] = []
+
+    def yes(condition: Expr) -> bool:
+        asked.append(condition)
+        return True
+
+    result = _counted(left, _one_way(graph, run, known, left, yes))
+    way = list(graph.decisions.items())
+    if not known and left[1] == PATHS and 2.0 ** len(asked) > PATHS:
+        _check_few(graph, run)
+    for condition in reversed(asked):  # and the other way, from each place where there is one
+        while way[-1][0] is not condition:
+            way.pop()
+        way.pop()
+        other = _followed(graph, run, {**dict(way), condition: False}, left)
+        result = _either(graph, condition, result, other)
+    return result
+
+
+def _one_way(
+    graph: Graph, run: Callable[[], Tracer], known: dict[Expr, bool], left: list[int],
+    answer: Callable[[Expr], bool],
+) -> Tracer | None:  # fmt: skip
+    """Follow one way through a function, as decisions say and answers to what is asked beyond."""
+    decisions = dict(known)
+
+    def decided(condition: Expr) -> bool:
+        implied = implied_by(condition, decisions)
+        if implied is not None:
+            return implied
+        if len(decisions) >= left[1]:
+            left[0] = -1
+            raise Unfollowed from Untraceable("a loop whose end depends on what is computed")
+        return answer(condition)
+
     graph.decisions, graph.implied, graph.guards, graph.passing = decisions, {}, [], []
-    graph.attempts = 0
+    graph.attempts, graph.answers = 0, decided
     try:
-        result = _guarded(graph, run())
+        return _guarded(graph, run())
     except Unfollowed as end:
         raise end.__cause__ or end from end
-    except OpenCondition as question:
-        condition = question.condition
     except Exception as error:
         if not decisions or not is_raised(error):
             raise
-        return _counted(left, None)
-    else:
-        return _counted(left, result)
-    if len(decisions) >= left[1]:
-        left[0] = -1
-        raise Untraceable("a loop whose end depends on what is computed")
-    implied = implied_by(condition, decisions)
-    if implied is not None:
-        return _followed(graph, run, {**decisions, condition: implied}, left)
-    yes = _followed(graph, run, {**decisions, condition: True}, left)
-    no = _followed(graph, run, {**decisions, condition: False}, left)
+        return None
+
+
+def _check_few(graph: Graph, run: Callable[[], Tracer]) -> None:
+    """Stop early where ways at random have so many turns that there are too many ways."""
+    chance, turns, likely = random.Random(0), [], 1.0
+
+    def tossed(condition: Expr) -> bool:
+        turns.append(condition)
+        return chance.random() < 0.5
+
+    while likely > _UNLIKELY:  # that there are so few ways, and those taken have so many turns
+        turns.clear()
+        _one_way(graph, run, {}, [PATHS, PATHS], tossed)
+        if 2.0 ** len(turns) <= PATHS:
+            return
+        likely *= PATHS / 2.0 ** len(turns)
+    raise Untraceable(f"more than {PATHS} paths through it")
+
+
+def _either(graph: Graph, condition: Expr, yes: Tracer | None, no: Tracer | None) -> Tracer | None:
+    """Return what comes out of two ways, NaN where one of them raises an error."""
     if yes is None or no is None:
         result = no if yes is None else yes
         if result is None:
@@ -166,9 +212,11 @@ def _guarded(graph: Graph, result: Tracer) -> Tracer:
 
 def _flat(graph: Graph, value: object) -> Tracer:
     """Return a function's result, an array, tuple, list or number, in one dimension."""
+    if value is None and graph.decisions:  # what no case is for; python-control raises an error
+        raise catchable(TypeError)
     if isinstance(value, tuple | list):
-        return concatenated(graph, [traced(graph, v).reshape(-1) for v in value])
-    return traced(graph, value).reshape(-1)
+        return concatenated(graph, [traced(graph, v).there().reshape(-1) for v in value])
+    return traced(graph, value).there().reshape(-1)
 
 
 _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le"}

@@ -155,11 +155,22 @@ def test_where_a_rank_is_lost_the_function_is_called():
     np.testing.assert_allclose(response.outputs[:, -1], ends, rtol=1e-5)
 
 
-@pytest.mark.parametrize("cases", ["True", "False"])
-def test_a_case_of_a_truth_value_asks_for_identity_and_is_refused(cases):
-    source = {"True": _true, "False": _false}[cases]
-    with pytest.raises(nlctl.errors.CompileError, match="identity"):
-        nlctl.compile(ct.nlsys(source, None, states=1, inputs=1, outputs=1))
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_a_case_of_a_truth_value_asks_for_identity(above):
+    """Python's own comparison is True or False itself; NumPy's equals it, and is not it."""
+    for source in (_true, _false, _of_numpy):
+        system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
+        compiled = nlctl.compile(system)
+        assert not compiled.equations.calls
+        assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+def _of_numpy(t, x, u, params):
+    match x[0] > 1.0:
+        case True | False:
+            return [1.0]
+        case _:
+            return [2.0 if (x[0] > 1.0) is False else 3.0]
 
 
 def _true(t, x, u, params):
@@ -176,3 +187,60 @@ def _false(t, x, u, params):
             return [1.0]
         case _:
             return [2.0]
+
+
+class Law:
+    """A law whose heirs ask for identity."""
+
+    def value(self, v):
+        return v
+
+
+class Heir(Law):
+    """Asks after a branch, in which names have come together."""
+
+    def value(self, v, sign=None):
+        if sign is True:
+            return super().value(v)
+        return -super().value(v)
+
+
+HEIR = Heir()
+
+
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_what_cannot_be_asked_on_expressions_is_called(above):
+    """Words that stay as they are: of a lambda, of a method that calls super(), of a class."""
+    for source in (
+        lambda t, x, u, params: [1.0 if (float(x[0]) > 1.0) is True else 2.0],
+        lambda t, x, u, params: [HEIR.value(x[0], float(x[0]) > 1.0)],
+        _by_class,
+    ):
+        system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
+        compiled = nlctl.compile(system)
+        assert compiled.equations.calls
+        assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+def _by_class(t, x, u, params):
+    match SETTINGS:
+        case Settings(gain=k):
+            return [k * x[0]]
+    return [0.0]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_where_nan_is_sorted_the_function_is_called():
+    """Seven in order, x' = -x: where NaN ends up only Python says."""
+
+    def update(t, x, u, params):
+        first, *_ = sorted([*(v + k for k, v in enumerate(x)), np.sqrt(u[0])])
+        return [-v if first < 9.0 else v for v in x]
+
+    system = ct.nlsys(update, None, states=6, inputs=1, outputs=6)
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    response = nlctl.input_output_response(compiled, [0.0, 1.0], 2.0, np.ones(6))
+    np.testing.assert_allclose(response.outputs[:, -1], np.exp(-1), rtol=1e-6)
+    called = nlctl.input_output_response(compiled, [0.0, 1.0], -1.0, np.ones(6))
+    np.testing.assert_allclose(called.outputs[:, -1], np.exp(-1), rtol=1e-6)

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..arrays import Tracer, full, mapped, traced
 from ..graph import Expr, Graph, Untraceable
-from ..operators import elementwise
+from ..operators import NO_INTEGER, elementwise
 from .complex_numbers import ComplexPair, holds_complex, paired
+from .python_objects import PythonNumbers
 from .shapes import by_moving
 from .table import ARRAY_METHODS, is_traced, of
 
@@ -75,6 +76,8 @@ def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
 @of(np.array, makes=True)
 def array(graph: Graph, values: Any, dtype: Any = None, copy: bool = True, ndmin: int = 0) -> Any:
     """Return numbers, lists and arrays as an array of its own."""
+    if isinstance(values, PythonNumbers):
+        return values.astype(dtype)
     if not holds_traced(values):
         result = np.array(values, dtype, ndmin=ndmin)
         if result.dtype != float:
@@ -161,7 +164,7 @@ def whole_numbers(graph: Graph, values: Tracer) -> Tracer:
             return graph.integer(e)
         limit = graph.const(2.0**63)
         fits = graph.op("lt", graph.op("absolute", e), limit)
-        lowest = graph.const(-(2.0**63))
+        lowest = graph.const(NO_INTEGER)
         return graph.integer(graph.op("select", fits, graph.op("trunc", e), lowest))
 
     cells = np.frompyfunc(cast, 1, 1)(values.cells)

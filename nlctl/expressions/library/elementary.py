@@ -11,7 +11,7 @@ import numpy as np
 from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
-from ..masked import MaskedPlaces
+from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, floor_quotient
 from .complex_numbers import ComplexPair
 from .table import ARRAY_METHODS, Facade, formula, of
@@ -74,6 +74,14 @@ def where(graph: Graph, condition: object, *values: object) -> Any:
     return elementwise(graph, "select", condition, *values)
 
 
+@of(np.argwhere)
+def argwhere(graph: Graph, condition: object) -> Masked:
+    """Return where a condition holds, each place in a row of its own."""
+    places = flatnonzero(graph, condition)
+    rows = np.arange(len(places.mask))[:, None]
+    return Masked(traced(graph, rows), places.mask)
+
+
 @of(np.flatnonzero)
 def flatnonzero(graph: Graph, condition: object) -> MaskedPlaces:
     """Return where a condition holds."""
@@ -86,10 +94,11 @@ def flatnonzero(graph: Graph, condition: object) -> MaskedPlaces:
 @of(np.clip)
 def _clip(
     graph: Graph, values: object, low: object = None, high: object = None, *, min: object = None,  # noqa: A002
-    max: object = None, out: Any = None,  # noqa: A002
+    max: object = None, a_min: object = None, a_max: object = None, out: Any = None,  # noqa: A002
 ) -> Any:  # fmt: skip
     """Return values between bounds."""
-    low, high = low if low is not None else min, high if high is not None else max
+    low = next((v for v in (low, min, a_min) if v is not None), None)
+    high = next((v for v in (high, max, a_max) if v is not None), None)
     clipped = traced(graph, values)
     if low is not None:
         clipped = elementwise(graph, "maximum", clipped, low)

@@ -19,10 +19,11 @@ from ..decimals import to_decimals
 from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, is_numpys
+from .ordered import extreme, first_ones, sorted_things
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
-         "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
+         "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
 _EXACT = 22  # the largest power of ten that is a float
 # of a kind of numbers: those of Python and of NumPy
@@ -88,6 +89,7 @@ class Builtins:
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
         names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
+        names["sorted"] = functools.partial(sorted_things, self.graph)
         names["min"] = functools.partial(self._extreme, "min")
         names["max"] = functools.partial(self._extreme, "max")
         return names
@@ -210,24 +212,17 @@ class Builtins:
         if values:
             options.pop("default", None)
         keys = [v if key is None else key(v) for v in values]
-        if not any(map(is_traced, (*values, *keys))):
+        if not any(map(_holds_traced, (*values, *keys))):
             return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)
-        if options or any(isinstance(v, Tracer) and v.shape for v in (*values, *keys)):
+        arrays = [v for v in (*([] if key else values), *keys) if isinstance(v, Tracer) and v.shape]
+        if options or arrays:
             raise Untraceable(f"{name} of arrays, or with {', '.join(options)}")
-        extreme, best = traced(self.graph, values[0]), traced(self.graph, keys[0])
-        for value, rank in zip(values[1:], keys[1:], strict=True):
-            extreme, best = self._further(name, (extreme, best), (value, rank))
-        return extreme
+        return extreme(name, values, keys, self.graph)
 
-    def _further(self, name: str, one: Any, other: Any) -> Any:
-        """Return the one of two pairs whose second part is beyond the other's."""
-        op = functools.partial(elementwise, self.graph)
-        kinds = [traced(self.graph, v).only.kind for v in (*one, *other)]
-        if set(kinds) == {"i"} and one[0] is one[1] and other[0] is other[1]:
-            both = op("minimum" if name == "min" else "maximum", one[0], other[0])
-            return both, both
-        beyond = op("lt" if name == "min" else "gt", other[1], one[1])
-        return op("select", beyond, other[0], one[0]), op("select", beyond, other[1], one[1])
+
+def _holds_traced(value: object) -> bool:
+    """Whether there are expressions in a number, or in a tuple of numbers."""
+    return any(map(_holds_traced, value)) if isinstance(value, tuple) else is_traced(value)
 
 
 @of(copy.copy, copy.deepcopy)
@@ -242,15 +237,8 @@ def copied(graph: Graph, value: Any, memo: object = None) -> Any:
     raise Untraceable(f"a copy of {type(value).__name__}")
 
 
-def _first_ones(reverse: bool) -> Callable[..., Any]:
-    def written(_: Graph, n: int, iterable: Any, key: Any = None) -> Any:
-        return sorted(iterable, key=key, reverse=reverse)[:n]
-
-    return written
-
-
-of(heapq.nlargest)(_first_ones(True))
-of(heapq.nsmallest)(_first_ones(False))
+of(heapq.nlargest)(first_ones(True))
+of(heapq.nsmallest)(first_ones(False))
 
 
 @of(np.vectorize)
@@ -276,18 +264,6 @@ def vectorize(graph: Graph, function: Callable[..., Any], otypes: object = None)
 
 def _is_float(graph: Graph, number: Tracer) -> bool:
     return number.only.kind == "f" and not (graph.mixed and graph.may_be_whole(number.only))
-
-
-@of(np.frompyfunc, makes=True)
-def frompyfunc(graph: Graph, function: Callable[..., Any], nin: int, nout: int) -> Any:
-    """Return a function of numbers; of arrays NumPy's returns arrays of objects."""
-
-    def of_numbers(*arguments: tuple[Any, ...]) -> Any:
-        if nout != 1 or any(traced(graph, a).shape for a in arguments):
-            raise Untraceable("np.frompyfunc of arrays")
-        return function(*(_handed_over(graph, a) for a in arguments))
-
-    return of_numbers
 
 
 def _handed_over(graph: Graph, value: object) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Tracer, as_array, traced
 from ..graph import Expr, Graph, Untraceable
-from ..masked import Masked
+from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, total, with_counts
 from .complex_numbers import ComplexPair
 from .table import ARRAY_METHODS, WRITTEN, Facade, constant_value, formula, of
@@ -63,6 +63,9 @@ def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
         keepdims: bool = False,
         initial: object = None,
     ) -> Any:
+        if isinstance(values, Masked | MaskedPlaces) and axis is initial is None:
+            return values.max() if name == "maximum" else values.min()
+
         def of_row(row: Sequence[Expr]) -> Expr:
             row = _numbers(graph, row)
             if initial is not None:
@@ -401,5 +404,5 @@ for _function, _written in _FORMULAS:
 ARRAY_METHODS.update(
     {name: getattr(np, name) for name in ("max", "min", "sum", "mean", "var", "std", "prod", "any",
                                           "all", "argmax", "argmin", "argsort", "ptp")},
-    sort=sorted_in_place,
+    sort=sorted_in_place, searchsorted=np.searchsorted, nonzero=np.nonzero, choose=np.choose,
 )  # fmt: skip

@@ -165,6 +165,8 @@ def _method(array: Tracer, name: str) -> Any:
     """Return a method of an array, or the part that it names."""
     if name in array.labels:
         return array.item_at(array.labels[name])
+    if array.is_column and name in ("iloc", "iat"):
+        return array
     if name not in ARRAY_METHODS:
         text = f"an array of expressions has no {name}"
         method = hasattr(np.ndarray, name) or hasattr(np.float64, name)

@@ -31,7 +31,7 @@ class _Gone:
 GONE = _Gone()
 _SEQUENCES = (list, tuple, deque, bytearray, array)
 _OF_PARTIALS = ("func", "args", "keywords")
-_TABLES = ("scipy.interpolate", "scipy.spatial.transform", "numpy.polynomial")
+_TABLES = ("scipy.interpolate", "scipy.spatial.transform", "scipy.sparse", "numpy.polynomial")
 
 
 @dataclass(frozen=True)

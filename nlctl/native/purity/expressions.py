@@ -233,8 +233,10 @@ class Expressions(ast.NodeVisitor):
         for test, left, right in zip(node.ops, values, values[1:], strict=False):
             self.operated(type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
-            is_none = isinstance(part, ast.Constant) and part.value is None
-            is_one = is_none or isinstance(value.known, enum.Enum)
+            is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
+            is_one = is_constant or isinstance(value.known, enum.Enum)
+            if is_one and isinstance(part, ast.Constant) and part.value is not None:
+                self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
             if isinstance(test, ast.Is | ast.IsNot) and not is_one:
                 raise Impure("tests identity with 'is'", "write == or !=")
         return FRESH
@@ -244,7 +246,23 @@ class Expressions(ast.NodeVisitor):
         self.operands(values)
         return least_upper_bound(values)
 
+    def decided(self, test: ast.expr) -> bool | None:
+        """Return what ``isinstance`` says of what is known to be of one class, None of others."""
+        if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+            answer = self.decided(test.operand)
+            return None if answer is None else not answer
+        if not isinstance(test, ast.Call) or self.visit(test.func).known is not isinstance:
+            return None
+        thing, kinds = (self.visit(part).known for part in test.args)
+        cls = thing.cls if isinstance(thing, Instance) else type(thing)
+        if not isinstance(thing, (Instance, *PLAIN)) or not isinstance(kinds, type):
+            return None
+        return issubclass(cls, kinds)
+
     def visit_IfExp(self, node: ast.IfExp) -> KnownValue:
+        answer = self.decided(node.test)
+        if answer is not None:
+            return self.visit(node.body if answer else node.orelse)
         self.condition(node.test)
         return least_upper_bound([self.visit(node.body), self.visit(node.orelse)])
 
@@ -288,8 +306,7 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, RowOf):
             return least_upper_bound(base.known.parts)
         if isinstance(base.known, OneOf):
-            lists = all(isinstance(choice.known, list | tuple) for choice in base.known.choices)
-            return element(base) if lists else base
+            return _of_one(base, keys)
         getter = made.operator_of(self.walk, base, "__getitem__")
         if getter is not None:
             return self.walk.function(getter, Given((base, *values[:1])))
@@ -349,9 +366,11 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
-            if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
+            if isinstance(value, BuiltinFunctionType) and isinstance(
+                thing, known_calls.WITH_METHODS
+            ):
                 return captured(value)  # a method, a new one each time it is read
-            if (library(type(thing)) or "").startswith("pandas"):
+            if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):
                 return captured(value)  # a part of a table that is noted
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
@@ -449,6 +468,18 @@ def _part(value: KnownValue, i: int, count: int) -> KnownValue:
         is_open = isinstance(whole.known, Unknown)
         return replace(whole, known=choice_among(column)) if is_open else whole
     return element(value)
+
+
+def _of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
+    """Return what is known of an element of one of several lists, or of one of several dicts."""
+    known = [choice.known for choice in base.known.choices]
+    if all(isinstance(thing, dict) for thing in known):
+        key, inside = keys[0], KnownValue(base.inside, base.inside, True)
+        if len(keys) > 1 or not isinstance(key, PLAIN):
+            return inside
+        parts = [captured(thing[key]) for thing in known if key in thing]
+        return least_upper_bound(parts) if parts else inside
+    return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
 
 
 def _is_plain_attribute(thing: object, name: str) -> bool:

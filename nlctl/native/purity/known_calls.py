@@ -8,6 +8,7 @@ import enum
 import functools
 import inspect
 import logging
+import re
 import warnings
 from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ import numpy as np
 from ...expressions.library.table import WRITTEN
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
+from . import method_names as named
 from .values import (
     FRESH,
     OUTSIDE,
@@ -54,66 +56,17 @@ from .walk import Walk
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
 DRAW = "draw the values before the run and give them as an input"
-# functions and methods that may return part of what they are given
-VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
-         "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
-         "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
-         "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
-         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
-         "to_numpy", "sliding_window_view"}  # fmt: skip
-WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
-           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
-           "heappushpop"}  # fmt: skip
-IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
-            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
-# functions that draw random numbers inside, read or write files, or change settings for everybody
-_OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
-           "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
-           "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
-_OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
-_OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
-                          "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
-                         "read files before the run, and write them after it")  # fmt: skip
-_TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
-_OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
-_OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
-              "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
+_FILES = "read files before the run, and write them after it"
+_ADVICE = {DRAW: named.DRAWING, MEMORY: named.SETTING, _FILES: named.OF_FILES}
+_OTHERS = {name: advice for advice, names in _ADVICE.items() for name in names}
+_TABLES = ("scipy.interpolate", "scipy.spatial", "scipy.sparse", "numpy.polynomial")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
-# methods that change nothing, of arrays, numbers, texts, dicts and lists
-READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
-           "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
-           "prod", "repeat", "round", "searchsorted", "std", "sum", "take", "tolist", "trace",
-           "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
-           "get", "items", "keys", "values", "_asdict", "_replace", "format", "join", "lower",
-           "upper", "startswith", "endswith", "split", "strip", "difference", "union",
-           "intersection", "isdisjoint", "issubset", "reduce", "accumulate", "outer"}  # fmt: skip
-CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
-            "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
-            "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
-            "rotate"}  # fmt: skip
-CONTAINERS = (
-    np.ndarray
-    | np.generic
-    | np.ufunc
-    | dict
-    | list
-    | tuple
-    | set
-    | frozenset
-    | str
-    | bytes
-    | bool
-    | int
-    | float
-    | complex
-    | range
-)
+CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | frozenset | str
+              | bytes | bool | int | float | complex | range)  # fmt: skip
+WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
-_PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
-          "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
-          "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
 
 
 def call(walk: Walk, thing: object, given: Given) -> KnownValue:
@@ -159,8 +112,7 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         known = Cached(places[0]) if is_function else Bound(captured(functools.cache), Given())
         return KnownValue(True, True, known=known)
     if thing is functools.reduce and not isinstance(places[0].known, Unknown):
-        first = [element(places[1]), *places[2:]]
-        return least_upper_bound([*first, walk.call(places[0], Given((OUTSIDE, first[0])))])
+        return _reduced(walk, places)
     if isinstance(thing, enum.EnumType) and len(places) == 1 and not issubclass(thing, enum.Flag):
         if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
             raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
@@ -177,6 +129,20 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
     return OUTSIDE if any(thing is reader for reader in reading) else None
+
+
+def _reduced(walk: Walk, places: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of what `functools.reduce` makes, which it hands on each time."""
+    part, count = element(places[1]), 1
+    if isinstance(places[1].known, ListOf | list | tuple):
+        known = places[1].known
+        count = len(known.choices if isinstance(known, ListOf) else known)
+    results = [least_upper_bound([part, *places[2:]])]
+    if not isinstance(function_choice(results), OneOf):  # numbers: whatever comes out of it
+        return least_upper_bound([*results, walk.call(places[0], Given((OUTSIDE, part)))])
+    for _ in range(count):  # functions of functions: each is made of those before
+        results.append(walk.call(places[0], Given((results[-1], part))))
+    return least_upper_bound(results)
 
 
 def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
@@ -199,23 +165,25 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     if type(owner).__module__.startswith(VARYING):
         if (type(owner).__name__, thing.__name__) in WRITTEN:
             return FRESH
-        if thing.__name__ in _OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
+        if thing.__name__ in named.OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
             raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if isinstance(owner, re.Pattern | re.Match):
+        return KnownValue(True, True, known=Pure())
     if isinstance(owner, logging.Logger) and _says_nothing(walk, owner, thing.__name__):
         return FRESH
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
         raise Message(f"writes messages with {thing.__name__}()", OUTPUT)
     if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
-        if thing.__name__ not in _OF_TABLES:
+        if thing.__name__ not in named.OF_TABLES:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
         return OUTSIDE
     cls = type(owner)  # of functions of numbers: splines, polynomials, rotations
     is_table = cls is np.poly1d or cls.__module__.startswith(_TABLES)
     if isinstance(thing, MethodType) and is_table:
-        if thing.__name__.startswith(("set_", "add_")):
+        if thing.__name__.startswith(("set_", "add_")) or thing.__name__ in named.OF_SPARSE:
             raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
-        return KnownValue(True, False, known=Pure())  # (other changes are named in CHANGING)
+        return KnownValue(True, False, known=Pure())  # (other changes: named.CHANGING)
     # somebody's, or one of python-control's, can be read
     if function is None or (library(function) or "control").partition(".")[0] != "control":
         name = getattr(thing, "__qualname__", type(thing).__name__)
@@ -264,12 +232,16 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given.places)
+    if isinstance(thing, Pure) and name == "rvs":
+        raise Impure("draws random numbers with rvs()", DRAW)
     if isinstance(thing, Pure) and name == "shuffle":
         _written(given.places[0], "shuffle()")
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
-        if name in CHANGING and not isinstance(getattr(type(thing), name, None), FunctionType):
+        if name in named.CHANGING and not isinstance(
+            getattr(type(thing), name, None), FunctionType
+        ):
             _written(base, f"{name}()")
         return None
     if type(thing).__module__ not in ("builtins", "numpy", Unknown.__module__):
@@ -279,11 +251,13 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if name == "at" and isinstance(thing, np.ufunc):
         _written(given.places[0], "an array with .at()")
         return FRESH
-    if name in READING:
+    if name in named.READING:
+        if given.names.get("inplace", captured(False)).known is not False:
+            _written(base, f"{name}(inplace=True)")
         return _read(base, name, given.places)
-    if name in VIEWS or name in ("T", "flat"):
+    if name in named.VIEWS or name in ("T", "flat"):
         return forgotten(base)
-    if name in CHANGING:
+    if name in named.CHANGING:
         _written(base, f"{name}()")
         return element(base) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
@@ -381,29 +355,29 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         return walk.function(operator, Given(places))
     if name == "vars" and len(places) == 1:
         return made.attributes_of(walk, places[0])
+    by_key = _by_key(walk, name, given)
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         if name not in _ITERATING or not iterates(walk, value):
-            _check_parts(value, name)
+            _check_parts(value, name, moves=by_key or name in _MOVING)
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
         known = places[0].known
         return OUTSIDE if isinstance(known, Unknown) else captured(type(known))
     if name in ("min", "max"):
-        _call_functions(walk, given.names.values())
         return least_upper_bound(
             [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
         )
     if thing is map and not isinstance(places[0].known, Unknown):
         return holder([walk.call(places[0], Given(tuple(map(element, places[1:]))))])
     if thing in MAKING:
-        _call_functions(walk, given.every)
+        _call_functions(walk, given.places if by_key else given.every)
         inside = all(v.inside for v in places)
         return KnownValue(True, inside, True, known=_rows(thing, places))
     if name == "next":
         _written(places[0], "next()")
         return element(places[0])
-    if name in _PLAIN:
+    if name in named.NUMBERS_AND_TEXTS:
         walk.numba_differs += ["text"] if name in ("str", "repr", "format") else []
         return FRESH
     if name == "print":
@@ -418,13 +392,25 @@ _ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter
 _MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
 
 
-def _check_parts(value: KnownValue, name: str) -> None:
+def _by_key(walk: Walk, name: str, given: Given) -> bool:
+    """Walk the key by which things are put in order, if there is one: they are only moved then."""
+    key = given.names.get("key", captured(None))
+    if name not in ("min", "max", "sorted") or key.known is None:
+        return False
+    places = list(given.places)
+    places = [element(places[0])] if len(places) == 1 else places
+    if not isinstance(key.known, Unknown):
+        walk.call(key, Given((least_upper_bound(places),)))
+    return True
+
+
+def _check_parts(value: KnownValue, name: str, moves: bool) -> None:
     """Check what a builtin does with a value, and with what is in it unless it only moves that."""
     known = value.known
-    if isinstance(known, ListOf) and name in _MOVING:
+    if isinstance(known, ListOf) and moves:
         return
     check_object(value, f"calls {name}() of")
-    if isinstance(known, list | tuple) and name not in _MOVING:
+    if isinstance(known, list | tuple) and not moves:
         for part in known:
             if not callable(part) or not isinstance(part, FunctionType | MethodType | np.ufunc):
                 check_object(captured(part), f"calls {name}() of a list that holds")
@@ -456,17 +442,19 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     name = getattr(thing, "__name__", "")
     if name in _SEEDED and given.places and type(given.places[0].known) is int:
         return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
+    if module.startswith("scipy.stats") and hasattr(thing, "freeze"):
+        return KnownValue(True, True, known=Pure())  # a law of probability, with its numbers
     if module.startswith(VARYING) and not module.startswith("numpy.lib.stride_tricks"):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
-        raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
-    if name in _OTHERS:
+        raise Impure(f"calls {name}, which reads or writes files", _FILES)
+    if name in _OTHERS and (module, name) != ("json", "loads"):  # which takes a text apart
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
     _call_functions(walk, given.every)
     for value in given.every:
         if not callable(value.known):
             check_object(value, f"hands {name}")
-    if name in WRITERS or (module.endswith("operator") and name in IN_PLACE):
+    if name in named.WRITERS or (module.endswith("operator") and name in named.IN_PLACE):
         _written(given.places[0], f"{name}()")
         return element(given.places[0]) if "heap" in name else FRESH
     if module in ("operator", "_operator") and isinstance(thing, type):
@@ -474,7 +462,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if _makes_objects(thing, module):
         # it may hold what it is given, instead of copies
         return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
-    if name in VIEWS or given.names.get("copy", captured(True)).known is not True:
+    if name in named.VIEWS or given.names.get("copy", captured(True)).known is not True:
         return forgotten(given.places[0]) if given.places else FRESH
     return FRESH
 
@@ -484,7 +472,7 @@ def _makes_objects(thing: object, module: str) -> bool:
     cls = thing if isinstance(thing, type) else getattr(thing, "__self__", None)
     if isinstance(cls, type) and not issubclass(cls, np.generic | np.ndarray | CONTAINERS):
         return module.partition(".")[0] in ("numpy", "scipy")
-    return module.startswith(("scipy.interpolate", "scipy.spatial"))
+    return module.startswith(("scipy.interpolate", "scipy.spatial", "scipy.sparse", "re"))
 
 
 def _call_functions(walk: Walk, values: Any) -> None:

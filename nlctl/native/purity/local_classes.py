@@ -6,36 +6,60 @@ happens.
 
 from __future__ import annotations
 
+import abc
 import ast
 import builtins
 import dataclasses
-from collections.abc import Iterator
-from types import FunctionType
+import inspect
+import typing
+from collections.abc import Iterator, Mapping
+from types import CellType, FunctionType
 from typing import Any
 
 from ...expressions.source import codes_in
 from .values import Impure
 
-_OF_METHODS = ("property", "staticmethod", "classmethod")
+_OF_METHODS = ("property", "staticmethod", "classmethod", "abstractmethod", "abc.abstractmethod")
 _OF_TYPES = (ast.Name, ast.Attribute, ast.Subscript, ast.Constant, ast.BinOp, ast.BitOr, ast.Tuple,
              ast.Load)  # fmt: skip
 _OF_CONSTANTS = (ast.Constant, ast.UnaryOp, ast.USub, ast.BinOp, ast.operator, ast.Tuple, ast.List,
                  ast.Name, ast.Load)  # fmt: skip
 
 
-def class_defined_in(node: ast.ClassDef, function: FunctionType, decorators: list[Any]) -> type:
+def class_defined_in(
+    node: ast.ClassDef, function: FunctionType, decorators: list[Any], bases: list[Any],
+    others: Mapping[str, type],
+) -> type:  # fmt: skip
     """Return the class that a function defines, or refuse one that is more than its methods."""
     codes = [c for c in codes_in(function.__code__) if _is_of(c, node)]
-    simple = not (node.bases or node.keywords) and all(map(_only_defines, node.body))
-    if len(codes) != 1 or codes[0].co_freevars or not simple:
+    simple = not node.keywords and all(map(_only_defines, node.body)) and all(map(_is_plain, bases))
+    if len(codes) != 1 or not simple:
         raise Impure(f"defines the class {node.name}", "define it outside of the function")
-    body: Any = FunctionType(codes[0], function.__globals__)
-    defined: Any = builtins.__build_class__(body, node.name)
+    # of what is around it the methods find other classes; an empty cell may be anything
+    cells = {
+        name: CellType(others[name]) if name in others else CellType()
+        for name in codes[0].co_freevars
+    }
+    around = tuple(cells.values())
+    body: Any = FunctionType(codes[0], function.__globals__, node.name, (), around)
+    defined: Any = builtins.__build_class__(body, node.name, *bases)
     for decorator, expression in zip(decorators, node.decorator_list, strict=True):
         if decorator is not dataclasses.dataclass:
             raise Impure(f"decorates the class {node.name}", "define it outside of the function")
         defined = decorator(**dict(_options(expression)))(defined)
+    if node.name in cells:
+        cells[node.name].cell_contents = defined
     return defined
+
+
+def _is_plain(base: Any) -> bool:
+    """Whether making a class from another runs nothing of anybody's."""
+    of_python = getattr(base, "__module__", "") in ("enum", "typing", "abc")
+    if of_python or not isinstance(base, type):
+        return of_python and base is not typing.Generic
+    beginning = inspect.getattr_static(base, "__init_subclass__")
+    begins = beginning is inspect.getattr_static(object, "__init_subclass__")
+    return begins and type(base) in (type, abc.ABCMeta)
 
 
 def constants_in_class(node: ast.ClassDef) -> Iterator[ast.expr]:

@@ -202,6 +202,8 @@ def attributes_of(walk: Walk, value: KnownValue) -> KnownValue:
     thing = value.known
     if isinstance(thing, Instance):
         return holder(thing.attributes.values())
+    if isinstance(thing, Unknown) and value.own and value.holds:
+        return dataclasses.replace(value)  # a `SimpleNamespace` that the call has made
     if isinstance(thing, Unknown | type | ModuleType) or not hasattr(thing, "__dict__"):
         raise Impure("calls vars() of what is only known when it runs", "name the attributes")
     walk.captured(thing, "__dict__", vars(thing))  # which may have more one day

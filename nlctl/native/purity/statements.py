@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import ast
 import contextlib
 import importlib
@@ -31,6 +32,7 @@ from .values import (
     forgotten,
     holder,
     least_upper_bound,
+    library,
 )
 from .walk import Walk
 
@@ -66,6 +68,9 @@ class CallWalker(Expressions):
     def statements(self, body: Sequence[ast.stmt]) -> None:
         for statement in body:
             self.visit(statement)
+            answer = self.decided(statement.test) if isinstance(statement, ast.If) else None
+            if answer is not None and _leaves(statement.body if answer else statement.orelse):  # type: ignore[attr-defined]
+                break
 
     def visit_Expr(self, node: ast.Expr) -> None:
         self.visit(node.value)
@@ -138,8 +143,12 @@ class CallWalker(Expressions):
         self.frame.shared |= dict.fromkeys(node.names, "nonlocal")
 
     def visit_If(self, node: ast.If) -> None:
-        self.condition(node.test)
-        if self.is_off(node.test):
+        answer = self.decided(node.test)
+        if answer is None:
+            self.condition(node.test)
+        if answer is not None:
+            self.statements(node.body if answer else node.orelse)
+        elif self.is_off(node.test):
             self.statements(node.orelse)
         else:
             self.either([node.body, node.orelse])
@@ -157,7 +166,7 @@ class CallWalker(Expressions):
         for body in bodies:
             self.frame.names = dict(before)
             self.statements(body)
-            if not (body and isinstance(body[-1], ast.Return | ast.Raise)):
+            if not _leaves(body):
                 ends.append(self.frame.names)
         self.frame.names = merged(ends or [before])
         everywhere = [name for name in self.frame.names if all(name in end for end in ends)]
@@ -190,12 +199,20 @@ class CallWalker(Expressions):
                 if name:
                     self.assign(name, KnownValue(subject.own and subject.inside, subject.inside))
                 if isinstance(part, ast.MatchSingleton) and part.value is not None:
-                    raise Impure("tests identity with a case of True or False", "write if")
+                    self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
                 if isinstance(part, ast.MatchClass):
-                    self.generic_visit(part)
+                    self.check_pattern(part)
             if case.guard is not None:
                 self.visit(case.guard)
         self.either([case.body for case in node.cases] + [[]])
+
+    def check_pattern(self, pattern: ast.MatchClass) -> None:
+        """Check that a pattern asks for somebody's class and reads its attributes alone."""
+        cls = self.visit(pattern.cls).known
+        plain = isinstance(cls, type) and library(cls) is None and type(cls) in (type, abc.ABCMeta)
+        names = (*pattern.kwd_attrs, *getattr(cls, "__match_args__", ())) if plain else ()
+        if not plain or any(isinstance(getattr(cls, name, None), property) for name in names):
+            self.generic_visit(pattern)  # which says that it is not known
 
     def visit_Assert(self, node: ast.Assert) -> None:
         self.visit(node.test)
@@ -277,8 +294,19 @@ class CallWalker(Expressions):
         if node not in self.walk.classes:
             calls = [d.func if isinstance(d, ast.Call) else d for d in node.decorator_list]
             decorators = [self.visit(call).known for call in calls]
-            self.walk.classes[node] = class_defined_in(node, self.frame.function, decorators)
+            bases = [self.visit(base).known for base in node.bases]
+            known = {k: v.known for k, v in self.frame.names.items()}
+            made_here = set(map(id, self.walk.classes.values()))
+            others = {k: v for k, v in known.items() if id(v) in made_here}
+            self.walk.classes[node] = class_defined_in(
+                node, self.frame.function, decorators, bases, others
+            )
         self.assign(node.name, captured(self.walk.classes[node]))
+
+
+def _leaves(body: Sequence[ast.stmt]) -> bool:
+    """Whether statements end with a way out of the function."""
+    return bool(body) and isinstance(body[-1], ast.Return | ast.Raise)
 
 
 def _imported(name: str, package: str | None = None) -> Any:
@@ -298,5 +326,5 @@ def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]
 
 def merged(ends: Sequence[dict[str, KnownValue]]) -> dict[str, KnownValue]:
     """Return what is known after one of several ways."""
-    names = {name for end in ends for name in end}
+    names = dict.fromkeys(name for end in ends for name in end)  # in order: super() asks the first
     return {name: least_upper_bound([end[name] for end in ends if name in end]) for name in names}

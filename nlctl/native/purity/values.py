@@ -23,7 +23,8 @@ _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
               "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
-              "statistics", "fractions", "pandas", "heapq", "_heapq")  # fmt: skip
+              "statistics", "fractions", "decimal", "pandas", "heapq", "_heapq", "json",
+              "re")  # fmt: skip
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
@@ -221,6 +222,8 @@ def element(value: KnownValue) -> KnownValue:
         if len(inner) == len(known.choices):
             return replace(plain, known=_of_any(inner))
         return least_upper_bound([plain, *inner]) if inner else replace(plain, known=known)
+    if isinstance(known, Pure):
+        return replace(plain, known=known)
     if isinstance(known, list | tuple | EnumType) and known:
         return replace(plain, known=choice_among(known))
     return plain

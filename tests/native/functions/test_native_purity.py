@@ -11,6 +11,7 @@ import time
 import control as ct
 import numpy as np
 import pytest
+import scipy.stats
 import source_text
 
 import nlctl
@@ -184,7 +185,33 @@ def prints(t, x, u, params):
     return x
 
 def tests_identity(t, x, u, params):
-    return x if params["flag"] is True else -x
+    return x if params["flag"] is x else -x
+
+def orders_by_what_remembers(t, x, u, params):
+    return sorted(x, key=lambda v: HISTORY.append(v) or v)
+
+def least_by_what_remembers(t, x, u, params):
+    return min([x, -x], key=lambda v: HISTORY.append(v) or 0.0)
+
+def reduces_by_what_remembers(t, x, u, params):
+    return functools.reduce(lambda a, b: HISTORY.append(a) or b, [np.sin, np.cos])(x)
+
+def draws_from_a_law(t, x, u, params):
+    return scipy.stats.norm(0.0, 1.0).rvs() + x
+
+def sorts_a_table_in_place(t, x, u, params):
+    params["table"].sort_values("k", inplace=True)
+    return x
+
+def keeps_in_a_class_inside(t, x, u, params):
+    class Keeper:
+        def keep(self, v):
+            HISTORY.append(v)
+            return v
+    class Heir(Keeper):
+        def keep(self, v):
+            return super().keep(v)
+    return Heir().keep(x)
 
 def writes_in_a_lambda(t, x, u, params):
     keep = lambda v: HISTORY.append(v)
@@ -322,7 +349,8 @@ def imports(t, x, u, params):
 NAMES = {
     "np": np, "GAIN": GAIN, "HISTORY": HISTORY, "TABLE": TABLE, "MATRIX": MATRIX, "RNG": RNG,
     "ENDLESS": ENDLESS, "TANK": TANK, "fill": fill, "random": random, "time": time,
-    "functools": functools, "operator": operator, "COUNTER": COUNTER,
+    "functools": functools, "operator": operator, "COUNTER": COUNTER, "scipy": scipy,
+    "__name__": __name__,
 }  # fmt: skip
 ARGUMENTS = [FRESH, VECTOR, VECTOR, captured(PARAMS)]
 

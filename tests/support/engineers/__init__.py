@@ -9,5 +9,6 @@ __all__ = ["ENTRIES", "Entry", "system"]
 for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "elementary", "language",
                "objects", "models", "everyday", "toolbox", "habits", "plants",
                "guarded", "caught", "vehicles", "processes", "laws", "lookups",
-               "packages", "iterations", "numbers_of_packages", "sums_and_searches"):  # fmt: skip
+               "packages", "iterations", "numbers_of_packages", "sums_and_searches",
+               "chosen_things", "chosen_rows", "other_words", "aliases"):  # fmt: skip
     importlib.import_module(f"engineers.{_theme}")

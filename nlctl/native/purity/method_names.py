@@ -1,0 +1,52 @@
+"""Names of functions and methods: what they do to what they are given."""
+
+# functions and methods that may return part of what they are given
+VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
+         "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
+         "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
+         "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
+         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
+         "to_numpy", "sliding_window_view"}  # fmt: skip
+WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
+           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
+           "heappushpop"}  # fmt: skip
+IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
+            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
+# of tables and columns of pandas, without inplace=True
+_OF_COLUMNS = {"abs", "idxmax", "idxmin", "sort_values", "sort_index", "set_index", "reset_index",
+               "fillna", "dropna", "cummax", "cummin", "reindex", "to_dict", "iterrows",
+               "itertuples"}  # fmt: skip
+_OF_TEXTS = {"format", "join", "lower", "upper", "startswith", "endswith", "split", "strip",
+             "splitlines", "replace", "lstrip", "rstrip", "rsplit", "rpartition", "removeprefix",
+             "removesuffix", "title", "capitalize", "casefold", "swapcase", "zfill", "find",
+             "rfind", "isalpha", "isdigit", "isnumeric", "isdecimal", "isalnum", "isspace",
+             "isupper", "islower", "isidentifier", "ljust", "rjust"}  # fmt: skip
+# methods that change nothing, of arrays, numbers, texts, dicts and lists
+READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
+           "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
+           "prod", "repeat", "round", "searchsorted", "std", "sum", "take", "tolist", "trace",
+           "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
+           "get", "items", "keys", "values", "_asdict", "_replace", "difference", "union",
+           "intersection", "isdisjoint", "issubset", "issuperset", "most_common",
+           "reduce", "accumulate", "outer", "limit_denominator", *_OF_TEXTS,
+           *_OF_COLUMNS}  # fmt: skip
+CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
+            "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
+            "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
+            "rotate"}  # fmt: skip
+# of sparse matrices, what changes them; of laws of probability; of tables of pandas
+OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_zeros", "prune")
+OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
+OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
+              "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
+# of builtins that return numbers and texts
+NUMBERS_AND_TEXTS = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float",
+                     "format", "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord",
+                     "pow", "range", "repr", "round", "slice", "str", "sum", "bytes", "object",
+                     "bin", "hex"}  # fmt: skip
+# functions that draw random numbers inside, change settings for everybody, read or write files
+DRAWING = ("differential_evolution", "basinhopping", "dual_annealing", "eigs", "eigsh", "svds",
+           "lobpcg", "kmeans", "kmeans2", "estimate_rank", "interp_decomp")  # fmt: skip
+SETTING = ("seterr", "seterrcall", "setbufsize", "set_printoptions")
+OF_FILES = ("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt", "loads", "dump",
+            "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint")  # fmt: skip
