@@ -115,7 +115,8 @@ def found_conditions(
     # Where it moves rates, declared switching functions, guards, by their blocks' places, what
     # arrives at delays and memories become (`others`), or an event function (`watched`). What
     # moves nothing but an output (`shown`) is counted.
-    declared, others, watched = tuple(declared), tuple(others), tuple(watched)
+    declared, others = tuple(declared), tuple(others)
+    watched = [_with_levels(reader.graph, function) for function in watched]
     solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
     moving = needed(roots)
@@ -141,13 +142,27 @@ def found_conditions(
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
         beyond += left
-    waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
+    waves, pulses = _moving(reader.graph, _terms(nodes, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time),
         declared_of_time=_declared_of_time(reader.graph, declared, timed), waves=waves,
-        pulses=pulses, beyond=beyond, shown=count, sharp=_sharp(reader, rates, inside - timed),
+        pulses=pulses, beyond=beyond, shown=count,
+        sharp=_sharp(reader, rates, watched, inside - timed),
     )  # fmt: skip
+
+
+def _with_levels(graph: Graph, function: Expr) -> Expr:
+    """Return whether an event function is above 0, if what says so is more than that function."""
+    # Between two roots close by a product is hardly below 0, and a peak may be narrow.
+    is_above = graph.op("greater", function, graph.const(0.0))
+    if not function.varies or _is_of_time(function):
+        return function
+    return function if switching_functions(graph, is_above) == (function,) else is_above
+
+
+def _is_of_time(function: Expr) -> bool:
+    return function in _of_time(needed([function]))
 
 
 def _declared_of_time(
@@ -188,10 +203,12 @@ def _entered(
     return rows, beyond
 
 
-def _sharp(reader: Reader, rates: Sequence[Tracer], moving: set[Expr]) -> tuple[SharpArgument, ...]:
-    """Return by what sharp functions of the users' blocks are measured."""
+def _sharp(
+    reader: Reader, rates: Sequence[Tracer], watched: Sequence[Expr], moving: set[Expr]
+) -> tuple[SharpArgument, ...]:
+    """Return by what sharp functions of the users' blocks, and of the run, are measured."""
     # Those of nlctl's own blocks are as smooth as their parameters have them.
-    nodes: dict[Expr, None] = {}
+    nodes = dict.fromkeys(part for part in needed(watched) if part in moving)
     for i, node in enumerate(reader.blocks):
         if node.sampled or _is_of_nlctl(node):
             continue
