@@ -12,7 +12,7 @@ from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, deduce, needed, parts_first
-from .levels import Level, factors_of_difference, undone
+from .levels import AtLevel, factors_of_difference, undone
 from .without_poles import as_fraction, compared, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
@@ -192,7 +192,7 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
         return b
     for rising, level, falls in ((a, b, False), (b, a, True)):
         # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
-        at = undone(graph, Level(rising, level, falls))
+        at = undone(graph, AtLevel(rising, level, falls))
         if at is not None and not at.is_blurred:
             return at.difference(graph)
     return graph.op("sub", a, b)

@@ -23,7 +23,7 @@ _INVERSE = {
 }
 
 
-class Level(NamedTuple):
+class AtLevel(NamedTuple):
     """Where a number is compared with what does not vary."""
 
     number: Expr
@@ -37,7 +37,7 @@ class Level(NamedTuple):
         return graph.op("sub", *(pair[::-1] if self.falls else pair))
 
 
-def undone(graph: Graph, at: Level) -> Level | None:
+def undone(graph: Graph, at: AtLevel) -> AtLevel | None:
     """Return where what a number is made of is at a level, None if only sums would be undone."""
     # Of these a number that is left alone is as it is written, so that no rounding comes in.
     known = None
@@ -53,7 +53,10 @@ def undone(graph: Graph, at: Level) -> Level | None:
 def factors_of_difference(graph: Graph, expr: Expr) -> tuple[Expr, ...]:
     """Return what changes its sign where a difference does: z - r and -r - z of z^2 - r^2."""
     # What is undone of a blurred level says about where: steps end there, and see the difference.
-    for at in (Level(*expr.args), Level(*expr.args[::-1], True)) if expr.op == "sub" else ():
+    if expr.op != "sub":
+        return (expr,)
+    first, second = expr.args
+    for at in (AtLevel(first, second), AtLevel(second, first, True)):
         if at.level.varies:
             continue
         if is_square(at.number):
@@ -65,33 +68,33 @@ def factors_of_difference(graph: Graph, expr: Expr) -> tuple[Expr, ...]:
     return (expr,)
 
 
-def _at_both_roots(graph: Graph, at: Level) -> tuple[Expr, ...]:
+def _at_both_roots(graph: Graph, at: AtLevel) -> tuple[Expr, ...]:
     """Return two differences of what is squared, none where the square is never at the level."""
     if at.level.op == "const" and not at.level.data > 0.0:
         return ()
     z = graph.number(at.number.args[0])
     root = graph.op("sqrt", graph.op("maximum", at.level, graph.const(0.0)))
     pairs = ((z, root), (graph.op("neg", root), z))
-    return tuple(Level(*pair, at.falls).difference(graph) for pair in pairs)
+    return tuple(AtLevel(*pair, at.falls).difference(graph) for pair in pairs)
 
 
-def _step(graph: Graph, number: Expr, level: Expr) -> tuple[Level, bool] | None:
+def _step(graph: Graph, number: Expr, level: Expr) -> tuple[AtLevel, bool] | None:
     """Return a level of what is one operation further inside, and whether that is a line."""
     if not number.varies or level.varies:
         return None
     args = [graph.number(arg) for arg in number.args]
     if number.op == "sqrt":
-        return Level(args[0], graph.op("mul", level, level)), False
+        return AtLevel(args[0], graph.op("mul", level, level)), False
     if number.op == "hypot":
         squares = (graph.op("mul", arg, arg) for arg in args)
-        return Level(graph.op("add", *squares), graph.op("mul", level, level)), False
+        return AtLevel(graph.op("add", *squares), graph.op("mul", level, level)), False
     if level.op == "const" and (inner := _inverse(graph, number, float(level.data))):
         return inner, False
     line = _line(graph, number.op, args, level)
     return None if line is None else (line, True)
 
 
-def _inverse(graph: Graph, number: Expr, level: float) -> Level | None:
+def _inverse(graph: Graph, number: Expr, level: float) -> AtLevel | None:
     """Return the level of what a function that rises is of, or of the root of a power."""
     if number.op in _INVERSE:
         inverse, larger = _INVERSE[number.op]
@@ -100,20 +103,20 @@ def _inverse(graph: Graph, number: Expr, level: float) -> Level | None:
         except (ValueError, OverflowError):  # it never is
             return None
         is_blurred = inner == 0.0 or larger(level, inner) > _BLURRED
-        return Level(graph.number(number.args[0]), graph.const(inner), is_blurred=is_blurred)
+        return AtLevel(graph.number(number.args[0]), graph.const(inner), is_blurred=is_blurred)
     base, exponent = as_power(number)
     if exponent < _STEEP or not (level > 0.0 or exponent % 2):
         return None
     base, root = graph.number(base), math.copysign(abs(level) ** (1.0 / exponent), level)
     if exponent % 2:
-        return Level(base, graph.const(root))
-    return Level(graph.op("mul", base, base), graph.const(root * root))
+        return AtLevel(base, graph.const(root))
+    return AtLevel(graph.op("mul", base, base), graph.const(root * root))
 
 
-def _line(graph: Graph, op: str, args: list[Expr], level: Expr) -> Level | None:
+def _line(graph: Graph, op: str, args: list[Expr], level: Expr) -> AtLevel | None:
     """Return the level of what is multiplied, or added to what does not vary."""
     if op == "neg":
-        return Level(args[0], graph.op("neg", level), True)
+        return AtLevel(args[0], graph.op("neg", level), True)
     if op not in ("add", "sub", "mul", "div") or all(arg.varies for arg in args):
         return None
     first = args[0].varies
@@ -122,10 +125,10 @@ def _line(graph: Graph, op: str, args: list[Expr], level: Expr) -> Level | None:
         if other.op != "const" or other.data == 0.0 or (op == "div" and not first):
             return None
         rest = graph.op("div" if op == "mul" else "mul", level, other)
-        return Level(number, rest, other.data < 0.0)
+        return AtLevel(number, rest, other.data < 0.0)
     rest = graph.op("sub", level, other)
     if op == "sub":
         rest = graph.op("add", level, other) if first else graph.op("sub", other, level)
     known = other.op == rest.op == "const"
     is_blurred = not known or abs(float(other.data)) > _BLURRED * abs(float(rest.data))
-    return Level(number, rest, op == "sub" and not first, is_blurred)
+    return AtLevel(number, rest, op == "sub" and not first, is_blurred)

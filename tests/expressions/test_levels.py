@@ -86,10 +86,7 @@ def test_a_square_rises_and_falls_where_it_does(engine):
     def square(t, x, u, params):
         return x[0] ** 2 - 0.25
 
-    def rises(t, x, u, params):
-        return 0.25 < x[0] ** 2
-
-    rises.direction = square.direction = 1
+    square.direction = 1
     run = nlctl.input_output_response(
         circle(), [0, 2 * np.pi], 0, [1.0, 0.0], events={"square": square}, engine=engine
     )
@@ -155,6 +152,6 @@ def test_a_step_that_ends_at_a_stop_is_shortened_there():
     stop = nlctl.record(type("S", (nlctl.actuators.Stop,), {"inputs": ("e",), "outputs": ("q",)}))
     loop = nlctl.interconnect({"clock": clock, "stop": stop(r=0.5)}, outputs=["q"])
     run = nlctl.input_output_response(
-        loop, [0, 2.99, 5.0], 0, method="taylor", rtol=1e-6, atol=1e-8, max_steps=2000
+        loop, [0, 2.99], 0, method="taylor", rtol=1e-6, atol=1e-8, max_steps=100
     )
-    assert np.allclose(run.outputs[0], [0.0, 2.0 * np.exp(-25.0), -0.5], atol=1e-5)
+    assert abs(run.outputs[0, -1] - 2.0 * np.exp(-25.0)) < 1e-8

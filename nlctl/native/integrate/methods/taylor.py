@@ -357,7 +357,7 @@ def _compare(task, lane, w, j):
                 inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
     for i in range(task.taylor.sides.shape[0]):
         first, farthest, row = 0.5, -1.0, task.taylor.sides[i, 0]
-        if is_followed(p, w.h[j], taylor.terms, row, j):
+        if is_followed(p, w.h[j], taylor.terms, row, 0.0, j):
             side = taylor.terms[p, task.taylor.sides[i, 1], j]
             first, farthest = first_crossing(
                 p, w.h[j], taylor.terms, row, side, until, taylor.shifted, j
@@ -371,11 +371,13 @@ def _compare(task, lane, w, j):
 def _follows(task, w, i, until, j):
     """Whether the polynomial of a switching function says what it is within a lane's step."""
     p, row = task.taylor.highest - 1, w.x.shape[0] + i
-    if not is_followed(p, w.h[j], w.taylor.terms, row, j):
+    # What only bends may be within this of 0 without an event, see `first_root`.
+    small = SMALL_KINK * task.atol if i < task.rows.declared else 0.0
+    if not is_followed(p, w.h[j], w.taylor.terms, row, small, j):
         return False
     if until < 1.0 or w.h[j] <= 1e6 * _shortest(task):
         return True  # something jumps before the end, or rounding has a say there
-    return is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], j)
+    return is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], small, j)
 
 
 @numba.njit(**INNER)
