@@ -117,8 +117,13 @@ def found_conditions(
     # moves nothing but an output (`shown`) is counted.
     declared, others = tuple(declared), tuple(others)
     watched = [_with_levels(reader.graph, function) for function in watched]
+    falls = {
+        i: [_with_levels(reader.graph, function) for function in _pieces([guard])]
+        for i, guard in guards.items()
+    }
     solved = [e for located in reader.fixed_points.values() for e in located]
-    roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
+    guarded = [function for functions in falls.values() for function in functions]
+    roots = [*others, *_pieces([*rates, *declared]), *guarded, *solved]
     moving = needed(roots)
     nodes = needed([*roots, *watched]) if watched else moving
     timed, inside = _of_time(nodes), set(nodes)
@@ -131,7 +136,7 @@ def found_conditions(
     steep = any(node.op in _STEEP and node.varies for node in moving)
     # values of parameters: 1 for those that are not known
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
-    for condition, node in _undeclared(reader, rates, guards, others, watched):
+    for condition, node in _undeclared(reader, rates, falls, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = None
         if condition in timed or condition not in inside:
@@ -148,17 +153,18 @@ def found_conditions(
         located=ordered, of_time=tuple(of_time),
         declared_of_time=_declared_of_time(reader.graph, declared, timed), waves=waves,
         pulses=pulses, beyond=beyond, shown=count,
-        sharp=_sharp(reader, rates, watched, inside - timed),
+        sharp=_sharp(reader, rates, falls, watched, inside - timed),
     )  # fmt: skip
 
 
 def _with_levels(graph: Graph, function: Expr) -> Expr:
-    """Return whether an event function is above 0, if what says so is more than that function."""
+    """Return whether a guard, or what is watched, is above 0, if more than itself says so."""
     # Between two roots close by a product is hardly below 0, and a peak may be narrow.
-    is_above = graph.op("greater", function, graph.const(0.0))
+    is_above = graph.op("gt", function, graph.const(0.0))
     if not function.varies or _is_of_time(function):
         return function
-    return function if switching_functions(graph, is_above) == (function,) else is_above
+    functions = switching_functions(graph, is_above)
+    return function if {*map(_key, functions)} == {_key(function)} else is_above
 
 
 def _is_of_time(function: Expr) -> bool:
@@ -204,7 +210,11 @@ def _entered(
 
 
 def _sharp(
-    reader: Reader, rates: Sequence[Tracer], watched: Sequence[Expr], moving: set[Expr]
+    reader: Reader,
+    rates: Sequence[Tracer],
+    guards: Mapping[int, list[Expr]],
+    watched: Sequence[Expr],
+    moving: set[Expr],
 ) -> tuple[SharpArgument, ...]:
     """Return by what sharp functions of the users' blocks, and of the run, are measured."""
     # Those of nlctl's own blocks are as smooth as their parameters have them.
@@ -213,7 +223,7 @@ def _sharp(
         if node.sampled or _is_of_nlctl(node):
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
-        parts = needed(_pieces([reader.signals[i], rates[i]]), given)
+        parts = needed([*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])], given)
         nodes |= dict.fromkeys(part for part in parts if part in moving)
     arguments, rows = [], 0
     for argument in sharp_arguments(reader.graph, nodes):
@@ -239,7 +249,7 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 def _undeclared(
     reader: Reader,
     rates: Sequence[Tracer],
-    guards: Mapping[int, Tracer],
+    guards: Mapping[int, list[Expr]],
     others: Sequence[Expr],
     watched: Sequence[Expr],
 ) -> Iterable[tuple[Expr, Node | None]]:
@@ -249,8 +259,8 @@ def _undeclared(
         if node.sampled or _declares(node):
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
-        parts = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
-        for condition in conditions(_pieces(parts), given, reader.graph.of_passes):
+        parts = [*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])]
+        for condition in conditions(parts, given, reader.graph.of_passes):
             yield condition, node
     # What signals are, and memories become, is of blocks.
     for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):
