@@ -144,27 +144,27 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
         return tuple(domain_edges(graph, needed(condition.args)))
     function = switching_function(graph, condition)
     if condition.op not in ORDERS:
-        return _factors(graph, function)
+        return sign_factors(graph, function)
     nodes = needed(condition.args)
     edges = [*domain_edges(graph, nodes), *poles(graph, nodes)]
-    return tuple(part for product in (function, *edges) for part in _factors(graph, product))
+    return tuple(part for product in (function, *edges) for part in sign_factors(graph, product))
 
 
 def _is_product(node: Expr) -> bool:
     return node.op == "neg" or (node.op == "mul" and not is_square(node))
 
 
-def _factors(graph: Graph, function: Expr) -> tuple[Expr, ...]:
+def sign_factors(graph: Graph, function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
-    factors: dict[Expr, tuple[Expr, ...]] = {}
+    known: dict[Expr, tuple[Expr, ...]] = {}
 
     def of_product(node: Expr) -> tuple[Expr, ...]:
         if not _is_product(node):
             return factors_of_difference(graph, node)
-        several = [part for arg in node.args if arg.varies for part in factors[arg]]
+        several = [part for arg in node.args if arg.varies for part in known[arg]]
         return tuple(several) if len(set(several)) == len(several) > 0 else (node,)
 
-    return deduce(factors, function, lambda e: e.args if _is_product(e) else (), of_product)
+    return deduce(known, function, lambda e: e.args if _is_product(e) else (), of_product)
 
 
 def _signed(graph: Graph, number: Expr) -> Expr:

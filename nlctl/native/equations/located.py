@@ -11,9 +11,10 @@ import numpy as np
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
-from ...expressions.conditions import at_integers, conditions, switching_functions
+from ...expressions.conditions import at_integers, conditions, sign_factors, switching_functions
 from ...expressions.dependence import affine, reads
 from ...expressions.derivatives import tangents
+from ...expressions.edges import have_edges
 from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
@@ -147,7 +148,10 @@ def found_conditions(
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
         beyond += left
-    waves, pulses = _moving(reader.graph, _terms(nodes, timed), timed)
+    # What a watched function is NaN behind is found by that, and moves without end before.
+    whole = [function for function in watched if not have_edges(needed([function]))]
+    terms = _terms(needed([*roots, *whole]) if whole else moving, timed)
+    waves, pulses = _moving(reader.graph, terms, timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time),
@@ -160,11 +164,9 @@ def found_conditions(
 def _with_levels(graph: Graph, function: Expr) -> Expr:
     """Return whether a guard, or what is watched, is above 0, if more than itself says so."""
     # Between two roots close by a product is hardly below 0, and a peak may be narrow.
-    is_above = graph.op("gt", function, graph.const(0.0))
-    if not function.varies or _is_of_time(function):
+    if len(sign_factors(graph, function)) == 1 or _is_of_time(function):
         return function
-    functions = switching_functions(graph, is_above)
-    return function if {*map(_key, functions)} == {_key(function)} else is_above
+    return graph.op("gt", function, graph.const(0.0))
 
 
 def _is_of_time(function: Expr) -> bool:
