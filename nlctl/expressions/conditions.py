@@ -12,16 +12,13 @@ from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, deduce, needed, parts_first
-from .sharp import as_power
+from .levels import AtLevel, factors_of_difference, undone
 from .without_poles import as_fraction, compared, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
 _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
 _OF_SECONDS = ("copysign",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
-_ROOTS = ("sqrt", "hypot")
-_STEEP = 3  # exponents from which on a power is too flat around 0 to be followed there
-_INVERSE = {"exp": math.log, "log": math.exp, "tanh": math.atanh}
 _OF_QUOTIENTS = ("remainder", "fmod")
 # functions that jump
 JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
@@ -147,27 +144,27 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
         return tuple(domain_edges(graph, needed(condition.args)))
     function = switching_function(graph, condition)
     if condition.op not in ORDERS:
-        return _factors(function)
+        return sign_factors(graph, function)
     nodes = needed(condition.args)
     edges = [*domain_edges(graph, nodes), *poles(graph, nodes)]
-    return tuple(part for product in (function, *edges) for part in _factors(product))
+    return tuple(part for product in (function, *edges) for part in sign_factors(graph, product))
 
 
 def _is_product(node: Expr) -> bool:
     return node.op == "neg" or (node.op == "mul" and not is_square(node))
 
 
-def _factors(function: Expr) -> tuple[Expr, ...]:
+def sign_factors(graph: Graph, function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
-    factors: dict[Expr, tuple[Expr, ...]] = {}
+    known: dict[Expr, tuple[Expr, ...]] = {}
 
     def of_product(node: Expr) -> tuple[Expr, ...]:
         if not _is_product(node):
-            return (node,)
-        several = [part for arg in node.args if arg.varies for part in factors[arg]]
+            return factors_of_difference(graph, node)
+        several = [part for arg in node.args if arg.varies for part in known[arg]]
         return tuple(several) if len(set(several)) == len(several) > 0 else (node,)
 
-    return deduce(factors, function, lambda e: e.args if _is_product(e) else (), of_product)
+    return deduce(known, function, lambda e: e.args if _is_product(e) else (), of_product)
 
 
 def _signed(graph: Graph, number: Expr) -> Expr:
@@ -193,51 +190,16 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
             break
     if _is_zero(a):
         return b
-    for rising, level, step in ((a, b, 1), (b, a, -1)):
+    for rising, level, falls in ((a, b, False), (b, a, True)):
         # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
-        inverse = _inverse(rising.op, level)
-        if inverse is not None:
-            pair = [graph.number(rising.args[0]), graph.const(inverse)]
-            return graph.op("sub", *pair[::step])
-    for power, level, step in ((a, b, 1), (b, a, -1)):
-        base, exponent = as_power(power)
-        if exponent >= _STEEP and level.op == "const" and (level.data > 0.0 or exponent % 2):
-            pair = _rooted_power(graph, graph.number(base), exponent, float(level.data))
-            return graph.op("sub", *pair[::step])
-    for root, other, step in ((a, b, 1), (b, a, -1)):
-        if root.op in _ROOTS and not other.varies:
-            squares = [_number_rooted_root(graph, root), graph.op("mul", other, other)]
-            return graph.op("sub", *squares[::step])
+        at = undone(graph, AtLevel(rising, level, falls))
+        if at is not None and not at.is_blurred:
+            return at.difference(graph)
     return graph.op("sub", a, b)
 
 
 def _is_zero(expr: Expr) -> bool:
     return expr.op == "const" and expr.data == 0.0
-
-
-def _rooted_power(graph: Graph, base: Expr, exponent: int, level: float) -> tuple[Expr, Expr]:
-    """Return what is as far apart as a power and a constant, without being flat around 0."""
-    root = math.copysign(abs(level) ** (1.0 / exponent), level)
-    if exponent % 2:
-        return base, graph.const(root)
-    return graph.op("mul", base, base), graph.const(root * root)
-
-
-def _inverse(op: str, level: Expr) -> float | None:
-    """Return what a function that rises is a constant at, None where that is not known."""
-    if op not in _INVERSE or level.op != "const":
-        return None
-    try:
-        return _INVERSE[op](float(level.data))
-    except (ValueError, OverflowError):  # it never is
-        return None
-
-
-def _number_rooted_root(graph: Graph, root: Expr) -> Expr:
-    args = [graph.number(arg) for arg in root.args]
-    if root.op == "sqrt":
-        return args[0]
-    return graph.op("add", *(graph.op("mul", arg, arg) for arg in args))
 
 
 def _at_integers(graph: Graph, z: Expr) -> Expr:

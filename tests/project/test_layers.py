@@ -84,6 +84,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["integers"],
         ["arrays", "operators", "masked", "indexing", "edges"],
         ["sharp", "without_poles", "decimals"],
+        ["levels"],
         [
             "conditions",
             "continuity",

@@ -11,9 +11,10 @@ import numpy as np
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
-from ...expressions.conditions import at_integers, conditions, switching_functions
+from ...expressions.conditions import at_integers, conditions, sign_factors, switching_functions
 from ...expressions.dependence import affine, reads
 from ...expressions.derivatives import tangents
+from ...expressions.edges import have_edges
 from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
@@ -115,9 +116,15 @@ def found_conditions(
     # Where it moves rates, declared switching functions, guards, by their blocks' places, what
     # arrives at delays and memories become (`others`), or an event function (`watched`). What
     # moves nothing but an output (`shown`) is counted.
-    declared, others, watched = tuple(declared), tuple(others), tuple(watched)
+    declared, others = tuple(declared), tuple(others)
+    watched = [_with_levels(reader.graph, function) for function in watched]
+    falls = {
+        i: [_with_levels(reader.graph, function) for function in _pieces([guard])]
+        for i, guard in guards.items()
+    }
     solved = [e for located in reader.fixed_points.values() for e in located]
-    roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
+    guarded = [function for functions in falls.values() for function in functions]
+    roots = [*others, *_pieces([*rates, *declared]), *guarded, *solved]
     moving = needed(roots)
     nodes = needed([*roots, *watched]) if watched else moving
     timed, inside = _of_time(nodes), set(nodes)
@@ -130,7 +137,7 @@ def found_conditions(
     steep = any(node.op in _STEEP and node.varies for node in moving)
     # values of parameters: 1 for those that are not known
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
-    for condition, node in _undeclared(reader, rates, guards, others, watched):
+    for condition, node in _undeclared(reader, rates, falls, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = None
         if condition in timed or condition not in inside:
@@ -141,13 +148,29 @@ def found_conditions(
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
         beyond += left
-    waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
+    # What a watched function is NaN behind is found by that, and moves without end before.
+    whole = [function for function in watched if not have_edges(needed([function]))]
+    terms = _terms(needed([*roots, *whole]) if whole else moving, timed)
+    waves, pulses = _moving(reader.graph, terms, timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time),
         declared_of_time=_declared_of_time(reader.graph, declared, timed), waves=waves,
-        pulses=pulses, beyond=beyond, shown=count, sharp=_sharp(reader, rates, inside - timed),
+        pulses=pulses, beyond=beyond, shown=count,
+        sharp=_sharp(reader, rates, falls, watched, inside - timed),
     )  # fmt: skip
+
+
+def _with_levels(graph: Graph, function: Expr) -> Expr:
+    """Return whether a guard, or what is watched, is above 0, if more than itself says so."""
+    # Between two roots close by a product is hardly below 0, and a peak may be narrow.
+    if len(sign_factors(graph, function)) == 1 or _is_of_time(function):
+        return function
+    return graph.op("gt", function, graph.const(0.0))
+
+
+def _is_of_time(function: Expr) -> bool:
+    return function in _of_time(needed([function]))
 
 
 def _declared_of_time(
@@ -188,15 +211,21 @@ def _entered(
     return rows, beyond
 
 
-def _sharp(reader: Reader, rates: Sequence[Tracer], moving: set[Expr]) -> tuple[SharpArgument, ...]:
-    """Return by what sharp functions of the users' blocks are measured."""
+def _sharp(
+    reader: Reader,
+    rates: Sequence[Tracer],
+    guards: Mapping[int, list[Expr]],
+    watched: Sequence[Expr],
+    moving: set[Expr],
+) -> tuple[SharpArgument, ...]:
+    """Return by what sharp functions of the users' blocks, and of the run, are measured."""
     # Those of nlctl's own blocks are as smooth as their parameters have them.
-    nodes: dict[Expr, None] = {}
+    nodes = dict.fromkeys(part for part in needed(watched) if part in moving)
     for i, node in enumerate(reader.blocks):
         if node.sampled or _is_of_nlctl(node):
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
-        parts = needed(_pieces([reader.signals[i], rates[i]]), given)
+        parts = needed([*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])], given)
         nodes |= dict.fromkeys(part for part in parts if part in moving)
     arguments, rows = [], 0
     for argument in sharp_arguments(reader.graph, nodes):
@@ -222,7 +251,7 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 def _undeclared(
     reader: Reader,
     rates: Sequence[Tracer],
-    guards: Mapping[int, Tracer],
+    guards: Mapping[int, list[Expr]],
     others: Sequence[Expr],
     watched: Sequence[Expr],
 ) -> Iterable[tuple[Expr, Node | None]]:
@@ -232,8 +261,8 @@ def _undeclared(
         if node.sampled or _declares(node):
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
-        parts = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
-        for condition in conditions(_pieces(parts), given, reader.graph.of_passes):
+        parts = [*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])]
+        for condition in conditions(parts, given, reader.graph.of_passes):
             yield condition, node
     # What signals are, and memories become, is of blocks.
     for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):

@@ -16,6 +16,8 @@ from .state import DIVERGED, FIRST_PATIENCE, INNER, OK, RUNNING, STEP_LIMIT, STE
 SMALLEST = 4e-16  # of the time: no shorter step can be told from none
 TRIAL = 20  # steps of the stiff method before it is judged
 MAX_PATIENCE = 2000
+_TO_STOP = 1.01  # times a step: a stop so close ends it
+_NOTICED = 0.98  # part of one that ends at a stop: a longer one would end there again
 
 
 @numba.njit(**INNER)
@@ -35,7 +37,7 @@ def choose_step(lane, stop, over, max_steps):
         lane.across = 1
     elif lane.tries == 0:
         lane.across = 0
-        lane.ends = 1 if lane.t + 1.01 * lane.h >= stop else 0
+        lane.ends = 1 if lane.t + _TO_STOP * lane.h >= stop else 0
         lane.step = stop - lane.t if lane.ends else lane.h
 
 
@@ -95,7 +97,7 @@ def shorten(lane, part):
     lane.rejected += 1
     lane.tries = lane.seeks = lane.traces = 0
     lane.cross = 0.0
-    lane.h = part * lane.step
+    lane.h = (min(part, _NOTICED) if lane.ends and part < 1.0 else part) * lane.step
 
 
 @numba.njit(**INNER)

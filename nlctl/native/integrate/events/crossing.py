@@ -28,7 +28,6 @@ _DECADES = 0.01  # of a bracket: nothing is foreseen of what leaves 0, not even 
 _GROWS = 100.0  # an error that is small by chance
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
-_NOTICED = 0.02  # the same where the step ends at a stop: a little less would be taken for it
 _LEAP = 10.0  # times the fastest rate
 _LEAST = 1e-12  # of the time: shorter steps are taken, by the explicit method, whatever stages see
 
@@ -78,7 +77,7 @@ def _shortened(lane, beyond):
         shorten(lane, 1.0)
         lane.cross = lane.step
         return REFUSED
-    left = 1.0 - min(max(_CLEARLY * beyond, _NOTICED if lane.ends else _GAP), _MOST)
+    left = 1.0 - min(max(_CLEARLY * beyond, _GAP), _MOST)
     if is_stiff(lane):
         left = min(left, max(0.2, 1.0 / (1.0 + beyond)))
     shorten(lane, left)

@@ -73,7 +73,7 @@ def turns_inside(task, w, until, j):
         start, row = w.memories.rate_start[i, j], memory_rate_row(task, w, i)
         if start == 0.0:
             continue
-        if not is_followed(highest, w.h[j], terms, row, j):
+        if not is_followed(highest, w.h[j], terms, row, 0.0, j):
             first = min(first, 0.5)
             continue
         turn = first_crossing(highest, w.h[j], terms, row, start, until, w.taylor.shifted, j)[0]

@@ -13,9 +13,10 @@ _TURNS = 5  # attempts at where a polynomial is least
 
 
 @numba.njit(**INNER)
-def is_followed(highest, h, terms, row, j):
+def is_followed(highest, h, terms, row, small, j):
     """Whether a polynomial's terms have become small at h: its last two add little to the rest."""
-    total, power, last = abs(terms[0, row, j]), 1.0, 0.0
+    # Where all of them are `small` they may be rounding, which is not small beside itself.
+    total, power, last = abs(terms[0, row, j]) + small, 1.0, 0.0
     for k in range(1, highest + 1):
         power *= h
         part = abs(power * terms[k, row, j])
@@ -26,13 +27,13 @@ def is_followed(highest, h, terms, row, j):
 
 
 @numba.njit(**INNER)
-def is_at(highest, h, terms, row, value, j):
+def is_at(highest, h, terms, row, value, small, j):
     """Whether a polynomial is at h what the right-hand side says: its last terms may both be 0."""
     extent, foreseen = abs(terms[highest, row, j]), terms[highest, row, j]
     for k in range(highest - 1, -1, -1):
         extent = extent * h + abs(terms[k, row, j])
         foreseen = foreseen * h + terms[k, row, j]
-    return not abs(value - foreseen) > FOLLOWED * extent
+    return not abs(value - foreseen) > FOLLOWED * (extent + small)
 
 
 @numba.njit(**INNER)

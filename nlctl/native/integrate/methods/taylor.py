@@ -43,6 +43,7 @@ _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
 _SHORTEST = 1e-12  # of the times: a step in which nothing is compared
+_LONGER, _LEFT = 16.0, 1e6  # times as long; and times the shortest, after which a place is left
 _EXPANSION, _GROWTH, _STEP, _JUDGE, _VALUES = 0, 1, 2, 3, 4  # functions of task.taylor.functions
 
 
@@ -110,8 +111,8 @@ def expand(task, lanes, w):
             h = _length(task.taylor.highest, taylor.largest, j)
             if h > 0.0:
                 lanes[j].h = h
-            if _begins_at_jump(task, lanes[j], taylor.terms, j):
-                lanes[j].h = _shortest(task)
+            if _begins_at_jump(task, taylor.terms, j):
+                lanes[j].h = _leaving(task, lanes[j])
         taylor.expanded[j] = 1
 
 
@@ -132,13 +133,11 @@ def _lacks_terms(task, w, j):
 
 
 @numba.njit(**INNER)
-def _begins_at_jump(task, lane, terms, j):
+def _begins_at_jump(task, terms, j):
     """Whether something compared is equal where the step begins, and is not right behind."""
     # The right-hand side may have another value there than on the side on which the solution goes
-    # on, and with it the first coefficients: a step that leaves the place is tried first, once.
-    # What a memory takes part in is equal where it has just turned, and nothing jumps there.
-    if lane.accepted and lane.last <= _shortest(task):
-        return False
+    # on, and with it the first coefficients: steps that leave the place are tried first. What a
+    # memory takes part in is equal where it has just turned, and nothing jumps there.
     for i in range(task.taylor.sides.shape[0]):
         side = task.taylor.sides[i, 1]
         if task.taylor.sides[i, 2]:
@@ -146,6 +145,18 @@ def _begins_at_jump(task, lane, terms, j):
         if terms[0, side, j] == 0.0 and terms[task.taylor.highest - 1, side, j] != 0.0:
             return True
     return False
+
+
+@numba.njit(**INNER)
+def _leaving(task, lane):
+    """Return a step that leaves a place where something compared is equal."""
+    # Longer each time: it may be equal, to rounding, at the end of a short one as well; and in the
+    # end as long as any other.
+    shortest = _shortest(task)
+    if not lane.accepted or lane.last > _LEFT * shortest:
+        return min(lane.h, shortest)
+    longer = _LONGER * max(lane.last, shortest)
+    return lane.h if longer > _LEFT * shortest else min(lane.h, longer)
 
 
 @numba.njit(**INNER)
@@ -346,7 +357,7 @@ def _compare(task, lane, w, j):
                 inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
     for i in range(task.taylor.sides.shape[0]):
         first, farthest, row = 0.5, -1.0, task.taylor.sides[i, 0]
-        if is_followed(p, w.h[j], taylor.terms, row, j):
+        if is_followed(p, w.h[j], taylor.terms, row, 0.0, j):
             side = taylor.terms[p, task.taylor.sides[i, 1], j]
             first, farthest = first_crossing(
                 p, w.h[j], taylor.terms, row, side, until, taylor.shifted, j
@@ -360,11 +371,13 @@ def _compare(task, lane, w, j):
 def _follows(task, w, i, until, j):
     """Whether the polynomial of a switching function says what it is within a lane's step."""
     p, row = task.taylor.highest - 1, w.x.shape[0] + i
-    if not is_followed(p, w.h[j], w.taylor.terms, row, j):
+    # What only bends may be within this of 0 without an event, see `first_root`.
+    small = SMALL_KINK * task.atol if i < task.rows.declared else 0.0
+    if not is_followed(p, w.h[j], w.taylor.terms, row, small, j):
         return False
     if until < 1.0 or w.h[j] <= 1e6 * _shortest(task):
         return True  # something jumps before the end, or rounding has a say there
-    return is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], j)
+    return is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], small, j)
 
 
 @numba.njit(**INNER)
