@@ -165,6 +165,7 @@ class StatePlaces:
     by: int  # number of quantities
     branches: int = 0  # number of sides of jumps that are kept
     lines: int = 0  # number of delayed signals whose jumps come back
+    turns: bool = False  # whether memories behind these reverse
     delays: tuple[list[bool], ...] = ()  # by quantity: whether it is the delay of each of these
 
     def derivative(self, j: int) -> int:
@@ -189,6 +190,10 @@ class StatePlaces:
     height = property(lambda self: self.number + 1)
     # how the time of that moves, by each quantity
     moved = property(lambda self: self.height + self.lines)
+    # the derivatives of all delayed signals right before that, at a time that moves
+    brought = property(lambda self: self.moved + self.by)
     # how many of these jumps have left each line
-    arrived = property(lambda self: self.moved + self.by if self.lines else self.number)
+    arrived = property(
+        lambda self: self.brought + self.turns * self.by * self.lines if self.lines else self.number
+    )
     size = property(lambda self: self.arrived + self.lines)  # number of all states

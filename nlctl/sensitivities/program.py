@@ -23,7 +23,7 @@ from ..native.settings import Settings
 from .directions import Direction, SomeRows
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
-from .schedule import Extended, extended, has_constant_delays, with_derivatives
+from .schedule import Extended, Sent, extended, has_constant_delays, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
@@ -92,19 +92,24 @@ def with_its_derivatives(
               for line in compiled.schedule.lines}  # fmt: skip
     rated = any(quantity.place in delays for quantity in quantities)
 
-    def sides_with(returns: bool) -> KeptSides:
-        """Return what the program is made of, with or without jumps that come back."""
-        room = extended(compiled, combinations, by, returns=returns, rated=rated)
+    def sides_with(sent: Sent) -> KeptSides:
+        """Return what the program is made of, with what is sent through its delays."""
+        room = extended(compiled, combinations, by, sent)
         whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
         return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
 
     returns = has_constant_delays(compiled)
-    sides = sides_with(returns)
-    if returns and not (rated or sides.watches or compiled.program.guards):
-        sides = sides_with(returns=False)  # nothing jumps
+    sides = sides_with(Sent.RATES if rated else Sent.JUMPS if returns else Sent.DERIVATIVES)
+    if sides.source.drives_by_delays:
+        sides = sides_with(Sent.TURNS)
+    elif returns and not (rated or sides.watches or compiled.program.guards):
+        sides = sides_with(Sent.DERIVATIVES)  # nothing jumps
     source, extended_program = sides.source, sides.source.extended
-    lines = extended_program.lines if extended_program.returns else 0
-    places = StatePlaces(states=n, by=by, branches=sides.rows, lines=lines)
+    sent = extended_program.sent
+    places = StatePlaces(
+        states=n, by=by, branches=sides.rows, lines=extended_program.lines if sent else 0,
+        turns=sent >= Sent.TURNS,
+    )  # fmt: skip
     places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
@@ -198,7 +203,9 @@ class _Maker:
             jumping.append((owner + 2, places.grazing, places.grazing + 1))
             guards[:0] = [owner + 2] * len(self.saltation.turning)
         if places.lines:
-            jumping += [(owner + 3, n, places.kept), (owner + 3, places.together, places.grazing)]
+            jumping.append((owner + 3, n, places.kept))
+            jumping += [(owner + 3, first, first + len(before.memory))] if places.turns else []
+            jumping.append((owner + 3, places.together, places.grazing))
             jumping.append((owner + 3, places.number, places.size))
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         program = replace(

@@ -9,14 +9,15 @@ sent says what derivatives need (`saltation`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph
 from .causes import Cause, When
-from .directions import SomeRows
+from .directions import Direction, SomeRows, Taken
 from .names import StatePlaces
+from .schedule import Sent
 from .source import EquationParts
 
 _ANOTHER = 0.5  # of a number of jumps
@@ -28,6 +29,7 @@ class Returning:
 
     source: EquationParts
     places: StatePlaces
+    seeds: Sequence[Direction]
 
     @property
     def graph(self) -> Graph:
@@ -74,12 +76,20 @@ class Returning:
     def counts(self, when: When, sent: Expr) -> Expr:
         """Return whether what is sent through the lines jumps, at a time that moves."""
         # What is sent at any other time leaves a line at one that moves with its delay.
-        return sent if self.source.extended.rated else self.graph.op("and", when.happens, sent)
+        rated = self.source.extended.sent >= Sent.RATES
+        return sent if rated else self.graph.op("and", when.happens, sent)
 
     def sent(
-        self, happens: Expr, earlier: Sequence[Expr], now: Sequence[SomeRows], moves: Sequence[Expr]
+        self,
+        happens: Expr,
+        earlier: Sequence[Expr],
+        now: Sequence[SomeRows],
+        moves: Sequence[Expr],
+        brought: Callable[[int, Sequence[Expr]], Sequence[Expr]],
     ) -> list[SomeRows]:
-        """Return number, heights and times of jumps, behind one that is sent if it `happens`."""
+        """Return all that is sent of jumps, behind one that is sent if it `happens`."""
+        # The derivatives of what was `earlier`, at the time that moves, are by a quantity what
+        # `brought` makes of it.
         graph, places = self.graph, self.places
         if not places.lines:
             return []
@@ -89,9 +99,10 @@ class Returning:
             for a, (b, size) in zip(earlier, now, strict=True)
             for k in range(size)
         ]
+        rest = [e for j in range(places.by) for e in brought(j, earlier)] if places.turns else []
         return [
             (graph.op("select", happens, new, self._state(places.number + k)), 1)
-            for k, new in enumerate([number, *heights, *moves])
+            for k, new in enumerate([number, *heights, *moves, *rest])
         ]
 
     @property
@@ -108,19 +119,46 @@ class Returning:
         heights = [places.height + i for i in lines]
         moves = [places.moved + j for j in range(places.by) for _ in lines]
         sent = [(self._state(place), 1) for place in [*numbers, *heights, *moves]]
-        return [*sent, *self._rates] if self.source.extended.rated else sent
+        if self.source.extended.sent >= Sent.RATES:
+            sent += self._rates
+        brought = range(places.by * places.lines if places.turns else 0)
+        return [*sent, *[(self._state(places.brought + k), 1) for k in brought]]
 
     @property
     def _rates(self) -> list[SomeRows]:
-        """The rates of what arrives at the lines."""
-        source = self.source
-        forward = source.time(source.moving(source.flow, source.committed), rated=True)
-        rates = source.changes([e for e, _ in source.arriving], forward)
-        return [
-            (self.graph.item(e, k), 1)
-            for e, (_, size) in zip(rates, source.arriving, strict=True)
-            for k in range(size)
-        ]
+        """The rates of what arrives at the lines, and where memories turn those of these."""
+        source, places = self.source, self.places
+        signals = self._single(source.arriving)
+        if not places.turns:
+            forward = source.time(source.moving(source.flow, source.committed))
+            return [(e, 1) for e in source.changes(signals, forward)]
+        flow = source.moving(source.flow, source.committed)
+        forward = source.time(source.flowing(flow, self.seeds))
+        rates = source.changes(signals, forward)
+        rows = [*rates, *source.changes(rates, forward)]
+        for seed in self.seeds:
+            rows += source.changes(source.changes(signals, seed), forward)
+        return [(e, 1) for e in rows]
+
+    def _single(self, pieces: Sequence[SomeRows]) -> list[Expr]:
+        return [self.graph.item(e, k) for e, size in pieces for k in range(size)]
+
+    def bringing(self, j: int, of: Mapping[str, Taken]) -> Mapping[str, Taken]:
+        """Return a direction in which what is `earlier` goes by a quantity as it was brought."""
+        # It is what leaves a line now and its height, so the height goes as the rest of it does.
+        graph, source, places = self.graph, self.source, self.places
+        heights = source.inputs + source.extended.line(places.by + 1, 0)
+        if not places.turns:
+            return of
+
+        def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
+            i = start - heights
+            if not 0 <= i < places.lines:
+                return of["u"](start, step, size)
+            now = of["u"](source.inputs + i, 1, None) or graph.const(0.0)
+            return graph.op("sub", self._leaving(source.extended.brought + j, i), now)
+
+        return {**of, "u": of_inputs}
 
     def _state(self, place: int) -> Expr:
         return self.graph.leaf("x", place, None)

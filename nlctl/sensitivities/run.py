@@ -26,6 +26,7 @@ from .missing import missing
 from .names import Observed, VariedQuantity, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
+from .schedule import Sent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +140,7 @@ def _start(
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
     start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
-    sides, rated = differentiated.sides, differentiated.extended.rated
+    sides, rated = differentiated.sides, differentiated.extended.sent >= Sent.RATES
     if not sides.rows and not differentiated.compiled.program.sampled and not rated:
         return start, {}
     arrays = _beginning(differentiated, run, u, start, p)

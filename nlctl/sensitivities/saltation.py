@@ -13,7 +13,7 @@ both by name only).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 
@@ -50,9 +50,13 @@ class Saltation:
         """Return what follows the states where a side has been left."""
         source, graph, places = self.source, self.source.graph, self.places
         arriving = self.sides.earlier([e for e, _ in source.arriving])
-        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
         before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
         behind = source.moving(source.flow, source.committed)
+        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+        if places.turns:
+            rates = source.changes(arriving, source.time(before))
+            pairs = [*zip(rates, self._rates_of_arriving(behind), strict=True)]
+            sent = graph.op("or", sent, self._differ(pairs))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
         when = self._when_left(reduce(partial(graph.op, "or"), [jumps, sent, *switches]))
@@ -64,13 +68,14 @@ class Saltation:
                 if a is not b:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
                 states.append((s, size))
-            across = self._across(j, before, behind, move)
+            across = self._across(j, before, behind, move, self._driving)
             for s, size in rows_replaced(graph, states, across):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         moves = self.returning.counts(when, sent)
         happens = [(when.apart, 1), (when.grazes, 1), (moves, 1)]
-        sent_rows = self.returning.sent(moves, arriving, source.arriving, when.moves)
+        brought = self._brought(before, when.moves)
+        sent_rows = self.returning.sent(moves, arriving, source.arriving, when.moves, brought)
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
         rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
         sent_rows = behind_all[len(rows) + 3 :]
@@ -111,7 +116,13 @@ class Saltation:
         pairs = [*zip(earlier, later, strict=True)]
         # what is reset to where it has fallen has moved by as little as a step ends behind that
         atol = graph.leaf("p", source.extended.slot("atol").offset, None)
-        sent = self._differ(pairs, graph.op("mul", graph.const(_UNSEEN), atol))
+        unseen = graph.op("mul", graph.const(_UNSEEN), atol)
+        sent = self._differ(pairs, unseen)
+        if places.turns:
+            rates = source.changes(earlier, source.time(before))
+            flow = source.moving(source.flow, source.committed)
+            after = self._after(rows, self._rates_of_arriving(flow))
+            sent = graph.op("or", sent, self._differ([*zip(rates, after, strict=True)], unseen))
         when, together = self._when_reset(guards)
         broken, after = graph.op("or", when.grazes, together), []
         for j, move in enumerate(when.moves):
@@ -126,27 +137,62 @@ class Saltation:
         after.append((self._lost_in_delay(moves), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
-        return [*after, *self.returning.sent(moves, earlier, later, when.moves)]
+        brought = self._brought(before, when.moves)
+        return [*after, *self.returning.sent(moves, earlier, later, when.moves, brought)]
+
+    def _rates_of_arriving(self, flow: Sequence[SomeRows]) -> list[SomeRows]:
+        """Return the rates of what arrives at the delays."""
+        source = self.source
+        rates = source.changes([e for e, _ in source.arriving], source.time(flow))
+        return [(e, size) for e, (_, size) in zip(rates, source.arriving, strict=True)]
+
+    def _brought(
+        self, before: Sequence[SomeRows], moves: Sequence[Expr]
+    ) -> Callable[[int, Sequence[Expr]], list[Expr]]:
+        """Return what has the derivatives of numbers right before a time that moves."""
+        graph = self.source.graph
+
+        def rows(j: int, exprs: Sequence[Expr]) -> list[Expr]:
+            _, of = self._arriving(j, before, moves[j])
+            of = self.returning.bringing(j, of)
+            pairs = zip(self._through(exprs, of, moves[j]), self.source.arriving, strict=True)
+            return [graph.item(e, k) for e, (_, size) in pairs for k in range(size)]
+
+        return rows
 
     def at_arrival(self) -> list[SomeRows]:
         """Return what follows the states where a jump leaves a delay."""
         source, graph, returning = self.source, self.source.graph, self.returning
         when = when_of(graph, returning.causes, self.places.by, self._rounding)
-        flow = returning.earlier([e for e, _ in source.flow])
+        flow = self._earlier([e for e, _ in source.flow])
         flow_before = [(e, size) for e, (_, size) in zip(flow, source.flow, strict=True)]
-        before = source.moving(flow_before, returning.earlier(source.committed))
+        before = source.moving(flow_before, self._earlier(source.committed))
         behind = source.moving(source.flow, source.committed)
-        rows: list[SomeRows] = []
+        driving, rows = returning.earlier(self._driving), []
         for j, move in enumerate(when.moves):
+            states = []
             for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
                 moved = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
-                rows.append((graph.op("select", when.apart, graph.const(0.0), moved), size))
+                states.append((moved, size))
+            if self.places.turns:
+                across = self._across(j, before, behind, move, driving)
+                states = rows_replaced(graph, states, across)
+            rows += [(graph.op("select", when.apart, graph.const(0.0), s), n) for s, n in states]
+        if self.places.turns:
+            rows += self.sides.now[len(self.sides.sides) :]
         rows.append((self._first(self.places.together, when.apart), 1))
-        arriving = returning.earlier([e for e, _ in source.arriving])
+        arriving = self._earlier([e for e, _ in source.arriving])
         sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+        if self.places.turns and source.extended.in_a_row:
+            sent = graph.const(True)  # a corner may go on
         moves = self.returning.counts(when, sent)
-        rows += returning.sent(moves, arriving, source.arriving, when.moves)
+        brought = self._brought(before, when.moves)
+        rows += returning.sent(moves, arriving, source.arriving, when.moves, brought)
         return [*rows, *returning.arrived]
+
+    def _earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
+        """Return expressions as they were before jumps that have just left delays."""
+        return self.returning.earlier(self.sides.earlier(exprs))
 
     def _lost_in_delay(self, moves: Expr) -> Expr:
         """Return when a jump whose time moves was first sent through delays that do not keep it."""
@@ -156,7 +202,7 @@ class Saltation:
     @cached_property
     def returning(self) -> Returning:
         """Jumps that come back through delays."""
-        return Returning(source=self.source, places=self.places)
+        return Returning(source=self.source, places=self.places, seeds=self.seeds)
 
     @cached_property
     def turning(self) -> list[tuple[Expr, Expr]]:
@@ -268,19 +314,24 @@ class Saltation:
         return arriving, of
 
     def _across(
-        self, j: int, before: Sequence[SomeRows], behind: Sequence[SomeRows], move: Expr
+        self,
+        j: int,
+        before: Sequence[SomeRows],
+        behind: Sequence[SomeRows],
+        move: Expr,
+        driving: Sequence[Expr],
     ) -> dict[int, Expr]:
-        """Return the derivatives of memories behind a condition, by their states."""
+        """Return the derivatives of memories behind a jump, by their states."""
         # What drives them may jump there: first they are what has driven them until then.
         graph, source, driven = self.source.graph, self.source, self.source.driven
         if not driven and not source.catching:
             return {}
         becomes = list(driven.values())
-        earlier = dict(zip(driven, self._driving, strict=True))
+        earlier = dict(zip(driven, driving, strict=True))
         now = {**self._switched, **source.catching, **earlier}
         after = [*source.with_states(becomes, now), *source.catching.values()]
         _, of = self._arriving(j, before, move)
-        changes = self._through(after, of, move)
+        changes = self._through(after, self.returning.bringing(j, of), move)
         left = graph.joined(list(behind))
         rows = {
             m: graph.op("sub", change, graph.op("mul", graph.item(left, m), move))

@@ -31,18 +31,14 @@ class DrivenMemories:
         graph = self.source.graph
         kept = self.sides.memories[m]
         become = self.source.driven[m]
-        self._check_driven(become)
         (change,) = self.source.slopes([become], self.seeds[j])
         derivative = graph.const(0.0) if change is None else change
         if at_turn and change is not None:
-            late, flowing = self._late(become), list(self.source.flow)
-            for i in range(self.places.by):
-                rates = self.source.changes([e for e, _ in self.source.flow], self.seeds[i])
-                sizes = (size for _, size in self.source.flow)
-                flowing += zip(rates, sizes, strict=True)
+            flowing = self.source.flowing(self.source.flow, self.seeds)
             forward = self.source.time(flowing, delays_move=False)
             (rate,) = self.source.slopes([change], forward)
             if rate is not None:
+                late = self._late(become)
                 derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
         if at_turn and m in self._at_corners:
             here, there = self._at_corners[m]
@@ -51,17 +47,6 @@ class DrivenMemories:
         moved = graph.op("ne", graph.leaf("x", m, None), kept)
         integrated = graph.leaf("x", self.places.derivative(j) + m, None)
         return graph.op("select", moved, derivative, integrated)
-
-    def _check_driven(self, become: Expr) -> None:
-        """Refuse a memory that is driven by a delayed signal."""
-        # When that turns is known by its rate, and whether there is a corner by both of them.
-        source = self.source
-        delayed = range(source.inputs, source.inputs + source.extended.lines)
-        if reads([become], "u", delayed):
-            raise CompileError(
-                "a memory is driven by a delayed signal, whose rate is not kept: put a lag behind "
-                "the delay (nlctl.Lag), or take differences of runs"
-            )
 
     @cached_property
     def _at_corners(self) -> dict[int, tuple[Expr, list[Expr]]]:
