@@ -67,8 +67,8 @@ def from_time(
         row = rate_row(start)
         if row is None and start in lines:
             raise CompileError(
-                "when something jumps depends on a delayed signal, whose rate is not kept: put a "
-                "lag behind the delay (nlctl.Lag), or take differences of runs"
+                "when something jumps depends on a signal whose delay varies, of which rates are "
+                "not kept: put a lag behind the delay (nlctl.Lag), or take differences of runs"
             )
         if row is None:
             return None

@@ -201,7 +201,7 @@ class _Run:
         labels = [*(labels[k] for k in ordered), *labels[len(ordered) :]]
         first = self.compiled.program.switching + conditions.rows
         watching = len(self.differentiated.saltation.turning) + bool(source.driven)
-        watching += self.differentiated.sides.watches
+        watching += self.differentiated.sides.watches + self.differentiated.places.lines
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):
             if first <= row < first + watching:

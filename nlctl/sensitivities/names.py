@@ -184,10 +184,10 @@ class StatePlaces:
     last = property(lambda self: self.together + 3)
     # when a guard and a condition were first met at one instant
     at_reset = property(lambda self: self.together + 4)
-    # number of jumps that were sent through delays
+    # number of jumps that were sent through each delay
     number = property(lambda self: self.together + 5)
     # how far each delayed signal has jumped last
-    height = property(lambda self: self.number + 1)
+    height = property(lambda self: self.number + self.lines)
     # how the time of that moves, by each quantity
     moved = property(lambda self: self.height + self.lines)
     # the derivatives of all delayed signals right before that, at a time that moves

@@ -102,6 +102,8 @@ def with_its_derivatives(
     sides = sides_with(Sent.RATES if rated else Sent.JUMPS if returns else Sent.DERIVATIVES)
     if sides.source.drives_by_delays:
         sides = sides_with(Sent.TURNS)
+    elif returns and not rated and sides.source.switches_by_delays:
+        sides = sides_with(Sent.RATES)
     elif returns and not (rated or sides.watches or compiled.program.guards):
         sides = sides_with(Sent.DERIVATIVES)  # nothing jumps
     source, extended_program = sides.source, sides.source.extended
@@ -189,6 +191,7 @@ class _Maker:
         jumping, guards = list(before.jumping), list(before.guards)
         turning = list(self.saltation.at_turns())
         first = places.kept + self.sides.first_memory
+        guards[:0] = [owner + 3] * places.lines
         for i, _, _ in before.jumping:
             jumping += [(i, n, places.together), (i, places.grazing, places.arrived)]
         if self.sides.watches:
@@ -212,7 +215,7 @@ class _Maker:
             before,
             layout=source.extended.layout,
             switching=source.behind,
-            guards=(*guards, *[owner + 3] * places.lines),
+            guards=tuple(guards),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
         )
@@ -297,8 +300,7 @@ class _Maker:
         rows = [apart for apart, _ in self.saltation.turning]
         rows += [self.sides.driven] if source.driven else []
         rows += [self.sides.margin] if self.sides.watches else []
-        rows += source.guards
-        rows += self.saltation.returning.guards
+        rows += [*self.saltation.returning.guards, *source.guards]
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:

@@ -87,8 +87,8 @@ def sensitivity_response(
         If the diagram cannot be compiled, is in discrete time, or something in it has no
         derivative: a parameter that numbers follow from outside of the equations, one that says
         when samples are taken, a delay where one varies or has a history or where blocks are
-        sampled, an algebraic loop that jumps, a condition on a delayed signal, a memory that one
-        drives.
+        sampled, an algebraic loop that jumps, a condition or a memory behind a delay that varies, a
+        memory that another one moves through a delay.
     ParameterError
         If a value is refused.
     DivergedError

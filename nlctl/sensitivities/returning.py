@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph
@@ -44,6 +45,12 @@ class Returning:
         return [graph.op("select", self._arrived(i), fallen, one) for i in lines]
 
     @property
+    def arrives(self) -> Expr | None:
+        """Whether a jump leaves any line now, None if there are none."""
+        every = [self._arrived(i) for i in range(self.places.lines)]
+        return reduce(lambda a, b: self.graph.op("or", a, b), every) if every else None
+
+    @property
     def causes(self) -> list[Cause]:
         """Which lines a jump has left, and how the time of that moves."""
         by, no = self.places.by, self.graph.const(False)
@@ -73,36 +80,43 @@ class Returning:
         scale = self.graph.leaf("p", self.source.extended.slot("scale").offset + j, None)
         return self.graph.op("add", sent, scale)
 
-    def counts(self, when: When, sent: Expr) -> Expr:
-        """Return whether what is sent through the lines jumps, at a time that moves."""
+    def counts(self, when: When, sent: Sequence[Expr]) -> list[Expr]:
+        """Return whether what is sent through each line jumps, at a time that moves."""
         # What is sent at any other time leaves a line at one that moves with its delay.
         rated = self.source.extended.sent >= Sent.RATES
-        return sent if rated else self.graph.op("and", when.happens, sent)
+        return [e if rated else self.graph.op("and", when.happens, e) for e in sent]
+
+    def goes_on(self, i: int) -> Expr:
+        """Return whether a corner that has left a delay arrives at a line at once."""
+        lines = range(self.places.lines if self.places.turns else 0)
+        arrived = [self._arrived(k) for k in lines if self.source.extended.direct[i, k]]
+        return reduce(lambda a, b: self.graph.op("or", a, b), arrived, self.graph.const(False))
 
     def sent(
         self,
-        happens: Expr,
+        happens: Sequence[Expr],
         earlier: Sequence[Expr],
-        now: Sequence[SomeRows],
+        now: Sequence[Expr],
         moves: Sequence[Expr],
         brought: Callable[[int, Sequence[Expr]], Sequence[Expr]],
     ) -> list[SomeRows]:
-        """Return all that is sent of jumps, behind one that is sent if it `happens`."""
+        """Return all that is sent of jumps, behind one that is sent where it `happens`."""
         # The derivatives of what was `earlier`, at the time that moves, are by a quantity what
         # `brought` makes of it.
         graph, places = self.graph, self.places
         if not places.lines:
             return []
-        number = graph.op("add", self._state(places.number), graph.const(1.0))
-        heights = [
-            graph.item(graph.op("sub", a, b), k)
-            for a, (b, size) in zip(earlier, now, strict=True)
-            for k in range(size)
-        ]
+        numbers = [self._state(places.number + i) for i in range(places.lines)]
+        numbers = [graph.op("add", number, graph.const(1.0)) for number in numbers]
+        heights = [graph.op("sub", a, b) for a, b in zip(earlier, now, strict=True)]
         rest = [e for j in range(places.by) for e in brought(j, earlier)] if places.turns else []
+        any_happens = reduce(lambda a, b: graph.op("or", a, b), happens)
+        new = [*zip(happens, numbers, strict=True), *zip(happens, heights, strict=True)]
+        new += [(any_happens, move) for move in moves]
+        new += [(happens[k % places.lines], e) for k, e in enumerate(rest)]
         return [
-            (graph.op("select", happens, new, self._state(places.number + k)), 1)
-            for k, new in enumerate([number, *heights, *moves, *rest])
+            (graph.op("select", if_sent, e, self._state(places.number + k)), 1)
+            for k, (if_sent, e) in enumerate(new)
         ]
 
     @property
@@ -115,7 +129,7 @@ class Returning:
     def arriving(self) -> list[SomeRows]:
         """What is sent through the lines behind the derivatives."""
         places, lines = self.places, range(self.places.lines)
-        numbers = [places.number for _ in lines]
+        numbers = [places.number + i for i in lines]
         heights = [places.height + i for i in lines]
         moves = [places.moved + j for j in range(places.by) for _ in lines]
         sent = [(self._state(place), 1) for place in [*numbers, *heights, *moves]]
@@ -128,7 +142,7 @@ class Returning:
     def _rates(self) -> list[SomeRows]:
         """The rates of what arrives at the lines, and where memories turn those of these."""
         source, places = self.source, self.places
-        signals = self._single(source.arriving)
+        signals = source.single_arriving
         if not places.turns:
             forward = source.time(source.moving(source.flow, source.committed))
             return [(e, 1) for e in source.changes(signals, forward)]
@@ -139,9 +153,6 @@ class Returning:
         for seed in self.seeds:
             rows += source.changes(source.changes(signals, seed), forward)
         return [(e, 1) for e in rows]
-
-    def _single(self, pieces: Sequence[SomeRows]) -> list[Expr]:
-        return [self.graph.item(e, k) for e, size in pieces for k in range(size)]
 
     def bringing(self, j: int, of: Mapping[str, Taken]) -> Mapping[str, Taken]:
         """Return a direction in which what is `earlier` goes by a quantity as it was brought."""

@@ -148,7 +148,8 @@ def _start(
         layout, lines = differentiated.extended.layout, differentiated.extended.schedule.lines
         before = [p[layout[line.block or 0]["before"].offset] for line in lines[: places.lines]]
         first = _values(differentiated, sides.source.arriving, arrays)
-        start[places.number], start[places.height : places.moved] = 1.0, before - first
+        start[places.number : places.height] = 1.0
+        start[places.height : places.moved] = before - first
     start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
     memories = [*sides.source.driven, *sides.source.catching]
     arrays["x"][memories, 0] = x0[memories]  # from where they are moved

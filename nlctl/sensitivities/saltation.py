@@ -49,17 +49,13 @@ class Saltation:
     def at_conditions(self) -> list[SomeRows]:
         """Return what follows the states where a side has been left."""
         source, graph, places = self.source, self.source.graph, self.places
-        arriving = self.sides.earlier([e for e, _ in source.arriving])
+        arriving = self.sides.earlier(source.single_arriving)
         before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
         behind = source.moving(source.flow, source.committed)
-        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
-        if places.turns:
-            rates = source.changes(arriving, source.time(before))
-            pairs = [*zip(rates, self._rates_of_arriving(behind), strict=True)]
-            sent = graph.op("or", sent, self._differ(pairs))
+        sent = self._sent(self._seen(arriving, before), self._seen(source.single_arriving, behind))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
-        when = self._when_left(reduce(partial(graph.op, "or"), [jumps, sent, *switches]))
+        when = self._when_left(reduce(partial(graph.op, "or"), [jumps, *sent, *switches]))
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
@@ -73,9 +69,11 @@ class Saltation:
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         moves = self.returning.counts(when, sent)
-        happens = [(when.apart, 1), (when.grazes, 1), (moves, 1)]
+        happens = [(e, 1) for e in (when.apart, when.grazes, self._any(moves))]
         brought = self._brought(before, when.moves)
-        sent_rows = self.returning.sent(moves, arriving, source.arriving, when.moves, brought)
+        sent_rows = self.returning.sent(
+            moves, arriving, source.single_arriving, when.moves, brought
+        )  # fmt: skip
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
         rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
         sent_rows = behind_all[len(rows) + 3 :]
@@ -83,6 +81,28 @@ class Saltation:
         rows.append((self._first(places.grazing, grazes[0]), 1))
         rows.append((self._lost_in_delay(jumped[0]), 1))
         return [*rows, *sent_rows]
+
+    def _any(self, conditions: Sequence[Expr]) -> Expr:
+        """Return whether any of some conditions holds."""
+        graph = self.source.graph
+        return reduce(partial(graph.op, "or"), conditions, graph.const(False))
+
+    def _seen(self, arriving: Sequence[Expr], flow: Sequence[SomeRows]) -> list[list[Expr]]:
+        """Return what may jump of what arrives at each delay: rates, too, if memories follow it."""
+        rates = self.places.turns and self.source.changes(arriving, self.source.time(flow))
+        return [list(pair) for pair in zip(arriving, *([rates] if rates else []), strict=True)]
+
+    def _sent(
+        self,
+        earlier: Sequence[Sequence[Expr]],
+        now: Sequence[Sequence[Expr]],
+        unseen: Expr | None = None,
+    ) -> list[Expr]:
+        """Return whether what arrives at each delay jumps."""
+        pairs = [
+            zip(a, [(e, 1) for e in b], strict=True) for a, b in zip(earlier, now, strict=True)
+        ]
+        return [self._any([self._differ([pair], unseen) for pair in line]) for line in pairs]
 
     def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
         """Return numbers as they are behind all break points of t that are passed at once."""
@@ -105,24 +125,20 @@ class Saltation:
     ) -> list[SomeRows]:
         """Return what follows the states where a block jumps."""
         source, graph, places = self.source, self.source.graph, self.places
-        before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
+        before = self._before_all
         rows: dict[int, Expr] = {}
         for expr, size in states:
             rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
         rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
-        later = self._after(rows, source.arriving)
-        earlier = self.sides.earlier([e for e, _ in source.arriving])
-        pairs = [*zip(earlier, later, strict=True)]
+        flow = source.moving(source.flow, source.committed)
+        lines = self._seen(source.single_arriving, flow)
+        later = [[e for e, _ in self._after(rows, [(e, 1) for e in line])] for line in lines]
+        earlier = self._earlier(source.single_arriving)
         # what is reset to where it has fallen has moved by as little as a step ends behind that
         atol = graph.leaf("p", source.extended.slot("atol").offset, None)
         unseen = graph.op("mul", graph.const(_UNSEEN), atol)
-        sent = self._differ(pairs, unseen)
-        if places.turns:
-            rates = source.changes(earlier, source.time(before))
-            flow = source.moving(source.flow, source.committed)
-            after = self._after(rows, self._rates_of_arriving(flow))
-            sent = graph.op("or", sent, self._differ([*zip(rates, after, strict=True)], unseen))
+        sent = self._sent(self._seen(earlier, before), later, unseen)
         when, together = self._when_reset(guards)
         broken, after = graph.op("or", when.grazes, together), []
         for j, move in enumerate(when.moves):
@@ -134,39 +150,28 @@ class Saltation:
             after.append((graph.leaf("x", m, None) if m in source.switched else stands, 1))
         after.append((self._first(places.grazing, when.grazes), 1))
         moves = self.returning.counts(when, sent)
-        after.append((self._lost_in_delay(moves), 1))
+        after.append((self._lost_in_delay(self._any(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
         brought = self._brought(before, when.moves)
-        return [*after, *self.returning.sent(moves, earlier, later, when.moves, brought)]
-
-    def _rates_of_arriving(self, flow: Sequence[SomeRows]) -> list[SomeRows]:
-        """Return the rates of what arrives at the delays."""
-        source = self.source
-        rates = source.changes([e for e, _ in source.arriving], source.time(flow))
-        return [(e, size) for e, (_, size) in zip(rates, source.arriving, strict=True)]
+        now = [line[0] for line in later]
+        return [*after, *self.returning.sent(moves, earlier, now, when.moves, brought)]
 
     def _brought(
         self, before: Sequence[SomeRows], moves: Sequence[Expr]
     ) -> Callable[[int, Sequence[Expr]], list[Expr]]:
         """Return what has the derivatives of numbers right before a time that moves."""
-        graph = self.source.graph
 
         def rows(j: int, exprs: Sequence[Expr]) -> list[Expr]:
             _, of = self._arriving(j, before, moves[j])
-            of = self.returning.bringing(j, of)
-            pairs = zip(self._through(exprs, of, moves[j]), self.source.arriving, strict=True)
-            return [graph.item(e, k) for e, (_, size) in pairs for k in range(size)]
+            return self._through(exprs, self.returning.bringing(j, of), moves[j])
 
         return rows
 
     def at_arrival(self) -> list[SomeRows]:
         """Return what follows the states where a jump leaves a delay."""
         source, graph, returning = self.source, self.source.graph, self.returning
-        when = when_of(graph, returning.causes, self.places.by, self._rounding)
-        flow = self._earlier([e for e, _ in source.flow])
-        flow_before = [(e, size) for e, (_, size) in zip(flow, source.flow, strict=True)]
-        before = source.moving(flow_before, self._earlier(source.committed))
+        when, before = self._when_arrived, self._before_all
         behind = source.moving(source.flow, source.committed)
         driving, rows = returning.earlier(self._driving), []
         for j, move in enumerate(when.moves):
@@ -181,18 +186,31 @@ class Saltation:
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
         rows.append((self._first(self.places.together, when.apart), 1))
-        arriving = self._earlier([e for e, _ in source.arriving])
-        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
-        if self.places.turns and source.extended.in_a_row:
-            sent = graph.const(True)  # a corner may go on
+        arriving = self._earlier(source.single_arriving)
+        sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
+        sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
         moves = self.returning.counts(when, sent)
         brought = self._brought(before, when.moves)
-        rows += returning.sent(moves, arriving, source.arriving, when.moves, brought)
+        rows += returning.sent(moves, arriving, source.single_arriving, when.moves, brought)
         return [*rows, *returning.arrived]
 
+    @property
+    def _when_arrived(self) -> When:
+        """Return how the time moves at which jumps leave delays."""
+        causes = self.returning.causes
+        return when_of(self.source.graph, causes, self.places.by, self._rounding)
+
     def _earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
-        """Return expressions as they were before jumps that have just left delays."""
+        """Return expressions as they were before jumps, those that have just left delays, too."""
         return self.returning.earlier(self.sides.earlier(exprs))
+
+    @cached_property
+    def _before_all(self) -> list[SomeRows]:
+        """The rates of all states before jumps, those that have just left delays, too."""
+        source = self.source
+        flow = self._earlier([e for e, _ in source.flow])
+        pieces = [(e, size) for e, (_, size) in zip(flow, source.flow, strict=True)]
+        return source.moving(pieces, self._earlier(source.committed))
 
     def _lost_in_delay(self, moves: Expr) -> Expr:
         """Return when a jump whose time moves was first sent through delays that do not keep it."""
@@ -395,9 +413,10 @@ class Saltation:
         """Return driven memories after a jump of other states."""
         # First they are what has driven them until then.
         driven = self.source.driven
+        driving = self.returning.earlier(self._driving)
         return {
             m: self.source.with_states([become], {**rows, m: earlier})[0]
-            for (m, become), earlier in zip(driven.items(), self._driving, strict=True)
+            for (m, become), earlier in zip(driven.items(), driving, strict=True)
         }
 
     def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
@@ -445,6 +464,8 @@ class Saltation:
                     graph.item(e, k)
                     for e in (side.kept, side.before.now, side.before.level, side.before.extent)
                 )
+                # what a jump that leaves a delay has taken across has not been met at a rate
+                (now,) = self.returning.earlier([now])
                 left = graph.op("and", graph.op("ne", kept, now), free)
                 rate, cause = self._met(left, level, extent, self.sides.flow_before)
                 causes += [cause] if rate is not None else []
@@ -463,24 +484,21 @@ class Saltation:
         # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
         # or by what was sampled right now: then that says how the time moves.
         graph, source = self.source.graph, self.source
-        earlier, fell = self.sides.earlier(guards), graph.const(False)
+        earlier, fell = self._earlier(guards), graph.const(False)
         for guard in earlier:
             sampled = reads([guard], "x", source.program.sampled)
             fallen = graph.op("lt", guard, graph.const(0.0))
             fell = graph.op("or", fell, graph.op("and", self._alone, fallen) if sampled else fallen)
         by_itself, by_jumps = self._when_fallen(earlier), self._when_left(graph.const(True))
-
-        def either(one: Expr, other: Expr) -> Expr:
-            return graph.op("select", fell, one, other)
-
+        arrived = self.returning.arrives
+        by_jumps = (
+            by_jumps
+            if arrived is None
+            else self._when_arrived.unless(graph.op("not", arrived), by_jumps, graph)
+        )
         left = graph.op("lt", self.sides.margin, graph.const(0.0))
-        when = When(
-            moves=[either(*pair) for pair in zip(by_itself.moves, by_jumps.moves, strict=True)],
-            grazes=either(by_itself.grazes, by_jumps.grazes),
-            apart=either(by_itself.apart, by_jumps.apart),
-            happens=either(by_itself.happens, by_jumps.happens),
-        )  # fmt: skip
-        return when, either(left, by_jumps.apart)
+        together = graph.op("select", fell, left, by_jumps.apart)
+        return by_jumps.unless(fell, by_itself, graph), together
 
     def _when_fallen(self, guards: Sequence[Expr]) -> When:
         """Return how the time moves at which a guard has fallen: the nearest to 0."""

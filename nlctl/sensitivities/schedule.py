@@ -52,7 +52,7 @@ class Extended:
     lines: int  # number of delayed signals
     by: int  # number of quantities
     sent: Sent  # what lines there are
-    in_a_row: bool  # whether what leaves a line may arrive at one at once
+    direct: np.ndarray  # whether what arrives at a line is at once made of what leaves another
 
     @property
     def groups(self) -> int:
@@ -117,9 +117,7 @@ def _nothing(t: float, x: object, u: object, params: object) -> Any:
     return np.zeros(0)
 
 
-def extended(
-    compiled: Compiled, outputs: Sequence[Any], by: int, sent: Sent
-) -> Extended:
+def extended(compiled: Compiled, outputs: Sequence[Any], by: int, sent: Sent) -> Extended:
     """Return the schedule of a diagram with room for its derivatives by so many quantities."""
     read = compiled.schedule
     before, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
@@ -143,7 +141,7 @@ def extended(
     return Extended(
         schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
         owner=len(nodes) - _OWNERS, lines=len(read.lines), by=by, sent=sent,
-        in_a_row=bool(direct_lines(read).any()),
+        direct=direct_lines(read),
     )  # fmt: skip
 
 

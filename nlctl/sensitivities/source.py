@@ -120,6 +120,11 @@ class EquationParts:
         return [(e, size) for e, (_, size) in zip(chosen, pieces, strict=True)]
 
     @cached_property
+    def single_arriving(self) -> list[Expr]:
+        """What arrives at each delay."""
+        return [self.graph.item(e, k) for e, size in self.arriving for k in range(size)]
+
+    @cached_property
     def jumps(self) -> list[Expr]:
         """The operations at which the flow may jump."""
         inside = [e for fixed_point in self.equations.fixed_points.values() for e in fixed_point]
@@ -212,19 +217,35 @@ class EquationParts:
     @property
     def drives_by_delays(self) -> bool:
         """Whether what leaves delays drives a memory, or the rate of what does."""
-        drivers = list(self.driven.values())
-        drivers += self.changes(drivers, self.time(self.flow, delays_move=False))
-        lines = range(self.inputs, self.inputs + self.extended.lines)
-        if not reads(drivers, "u", lines):
+        if not self._reads_delays(list(self.driven.values())):
             return False
         nodes = self.extended.schedule.nodes
-        specs = [nodes[line.block or 0].system.current_spec for line in self.extended.schedule.lines]
+        specs = [
+            nodes[line.block or 0].system.current_spec for line in self.extended.schedule.lines
+        ]
         if any(spec.varying is not None for spec in specs):
             raise CompileError(
                 "a memory is driven by a signal whose delay varies, of which rates are not kept: "
                 "derivatives of that are not known; take differences of runs"
             )
+        if reads([e for e, _ in self.arriving], "x", self.driven):
+            raise CompileError(
+                "a memory is driven by what another one moves, through a delay: where that sets "
+                "out is not sent through it; take differences of runs"
+            )
         return True
+
+    @property
+    def switches_by_delays(self) -> bool:
+        """Whether what leaves delays, or its size, says when something jumps."""
+        arguments = [self.graph.number(a) for jump in self.jumps for a in jump.args]
+        return self._reads_delays([*arguments, *self.of_memories, *self.guards])
+
+    def _reads_delays(self, exprs: Sequence[Expr]) -> bool:
+        """Return whether expressions, or their rates, are made of what leaves delays."""
+        rates = self.changes(exprs, self.time(self.flow, delays_move=False))
+        lines = range(self.inputs, self.inputs + self.extended.lines)
+        return reads([*exprs, *rates], "u", lines)
 
     def flowing(self, flow: Sequence[SomeRows], seeds: Sequence[Direction]) -> list[SomeRows]:
         """Return rates of the states, and behind them those of their derivatives."""

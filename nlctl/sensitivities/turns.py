@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import CompileError
-from ..expressions.dependence import reads
-from ..expressions.graph import Expr
+from ..expressions.dependence import rows_read
+from ..expressions.graph import Expr, needed
 from .corners import at_corner, corners_of
 from .directions import Direction
 from .names import StatePlaces
@@ -37,9 +37,16 @@ class DrivenMemories:
             flowing = self.source.flowing(self.source.flow, self.seeds)
             forward = self.source.time(flowing, delays_move=False)
             (rate,) = self.source.slopes([change], forward)
+            recent, late = self._late(become)
             if rate is not None:
-                late = self._late(become)
+                late = graph.op("select", recent, late, graph.const(0.0))
                 derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
+            if self._is_moved_by_delay(j, become):
+                # a break of an input, whose time moves behind the delay as that does
+                scale = graph.leaf("p", self.source.extended.slot("scale").offset + j, None)
+                (rate,) = self.source.changes([become], forward)
+                moved = graph.op("add", derivative, graph.op("mul", scale, rate))
+                derivative = graph.op("select", recent, derivative, moved)
         if at_turn and m in self._at_corners:
             here, there = self._at_corners[m]
             derivative = graph.op("select", here, there[j], derivative)
@@ -63,16 +70,32 @@ class DrivenMemories:
         """How late a turn may be seen."""
         return self.source.graph.leaf("p", self.source.extended.slot("late").offset, None)
 
-    def _late(self, become: Expr) -> Expr:
-        """Return how long ago what drives a memory has reversed, 0 at a break."""
+    def _is_moved_by_delay(self, j: int, become: Expr) -> bool:
+        """Whether breaks of inputs that drive a memory move as a quantity, a delay, does."""
+        source = self.source
+        if not (source.inputs and any(self.places.delays[j])):
+            return False
+        by = {
+            self.places.delays[j][row - source.inputs] if row >= source.inputs else False
+            for leaf in needed([become])
+            if leaf.op == "leaf" and leaf.data[0] == "u"
+            for row in rows_read(leaf)
+        }
+        if len(by) > 1 or source.extended.direct.any():
+            raise CompileError(
+                "a memory is driven by inputs that come through several ways, of which one has a "
+                "delay that is differentiated by: where inputs have kinks that is not known; take "
+                "differences of runs"
+            )
+        return by == {True}
+
+    def _late(self, become: Expr) -> tuple[Expr, Expr]:
+        """Return whether what drives a memory has just reversed smoothly, and how long ago."""
         # Where it turns is located by a difference of rates: a little too early or too late.
         graph, source = self.source.graph, self.source
         zero = graph.const(0.0)
         forward = source.time(source.flow, delays_move=False)
         (rate,) = self.source.slopes([become], forward)
         (bend,) = self.source.slopes([rate or zero], forward)
-        if bend is None:
-            return zero
-        late = graph.op("div", rate or zero, bend)
-        recent = graph.op("le", graph.op("absolute", late), self._longest)
-        return graph.op("select", recent, late, zero)
+        late = graph.op("div", rate or zero, bend or zero)
+        return graph.op("le", graph.op("absolute", late), self._longest), late

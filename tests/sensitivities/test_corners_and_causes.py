@@ -3,40 +3,9 @@
 import control as ct
 import numpy as np
 import pytest
+from closed_form_runs import CORNERS, A, P, R, integral, source
 
 import nlctl
-from nlctl.errors import CompileError
-
-A, P, R = 1.0, 0.7, 1.3  # height and place of a corner, and a rate
-
-
-def source(output, params, rate=None):
-    """Signals of t and of x = rate t."""
-    return ct.nlsys(
-        lambda t, x, u, p: [p[rate] if rate else 1.0], output, inputs=0, outputs=["u"],
-        states=["x"], params=params, name="source",
-    )  # fmt: skip
-
-
-def integral(inp="v"):
-    return ct.nlsys(
-        lambda t, x, u, p: [u[0]], lambda t, x, u, p: [x[0]], inputs=[inp], outputs=["y"],
-        states=["y"], name="integral",
-    )  # fmt: skip
-
-
-CORNERS = {
-    "abs of t": lambda t, x, u, p: [p["A"] - np.abs(t - p["P"])],
-    "abs": lambda t, x, u, p: [p["A"] - np.abs(x[0] - p["P"])],
-    "min": lambda t, x, u, p: [np.minimum(x[0] - p["P"], p["P"] - x[0]) + p["A"]],
-    "max": lambda t, x, u, p: [p["A"] - np.maximum(x[0] - p["P"], p["P"] - x[0])],
-    "where": lambda t, x, u, p: [
-        np.where(x[0] > p["P"], p["P"] - x[0], x[0] - p["P"]) + p["A"]
-    ],
-    "sign": lambda t, x, u, p: [p["A"] - np.sign(x[0] - p["P"]) * (x[0] - p["P"])],
-    "root": lambda t, x, u, p: [p["A"] - np.sqrt((x[0] - p["P"]) ** 2)],
-    "remainder": lambda t, x, u, p: [p["A"] - np.abs(np.mod(x[0] - p["P"] + 2, 4) - 2)],
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
@@ -178,13 +147,3 @@ def test_narrow_functions_are_followed(method):
     by = ["hill.R", "hill.c", "hill.d"]
     made = nlctl.sensitivity_response(hill, [0, 3.0], with_respect_to=by, method=method)
     assert made.derivatives[0, :, -1] == pytest.approx([-np.sqrt(np.pi) / R**2, 0, 0], abs=1e-5)
-
-
-def test_memories_behind_delays_are_refused():
-    """Where they turn is not known to the last digit without the rate, a corner not at all."""
-    wire = nlctl.block(nlctl.TransportDelay(inputs=("u",), outputs=("s",), delay=0.2), "wire")
-    moving = source(lambda t, x, u, p: [np.sin(x[0] * p["w"])], {"w": 3.0})
-    gap = nlctl.block(nlctl.Backlash(), "gap", inputs=["s"], outputs=["v"])
-    loop = nlctl.interconnect([wire, moving, gap], inputs=[], outputs=["v"], name="loop")
-    with pytest.raises(CompileError, match="a memory is driven by a delayed signal"):
-        nlctl.sensitivity_response(loop, [0, 1], with_respect_to="source.w")
