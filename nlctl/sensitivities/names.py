@@ -166,6 +166,7 @@ class StatePlaces:
     branches: int = 0  # number of sides of jumps that are kept
     lines: int = 0  # number of delayed signals whose jumps come back
     turns: bool = False  # whether memories behind these reverse
+    driven: int = 0  # number of memories that are driven
     delays: tuple[list[bool], ...] = ()  # by quantity: whether it is the delay of each of these
 
     def derivative(self, j: int) -> int:
@@ -184,8 +185,16 @@ class StatePlaces:
     last = property(lambda self: self.together + 3)
     # when a guard and a condition were first met at one instant
     at_reset = property(lambda self: self.together + 4)
+    # when each memory that is driven was first touched at its end, or hardly moved
+    touched = property(lambda self: self.together + 5)
+    # when it first turned at two corners at once
+    cornered = property(lambda self: self.touched + self.driven)
+    # where it stood before it was moved
+    stood = property(lambda self: self.cornered + self.driven)
+    # when it last turned
+    turned = property(lambda self: self.stood + self.driven)
     # number of jumps that were sent through each delay
-    number = property(lambda self: self.together + 5)
+    number = property(lambda self: self.turned + self.driven)
     # how far each delayed signal has jumped last
     height = property(lambda self: self.number + self.lines)
     # how the time of that moves, by each quantity

@@ -7,7 +7,7 @@ with memories and samples what the derivative of these says, and jump at conditi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..native.equations.blocks import Equations
 from ..native.equations.located import Located
 from ..native.settings import Settings
 from .directions import Direction, SomeRows
+from .ends import MemoryEnds
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
 from .schedule import Extended, Sent, extended, has_constant_delays, with_derivatives
@@ -43,6 +44,7 @@ class Differentiated:
     sides: KeptSides
     outputs: int  # number of the signals that are outputs
     saltation: Saltation
+    touching: int  # number of what is watched for turning away where it is touched
     # derivatives of levels that a run was on, by the number of the quantity
     changes: dict[tuple[Expr, int], Expr | None] = field(default_factory=dict)
 
@@ -110,14 +112,19 @@ def with_its_derivatives(
     sent = extended_program.sent
     places = StatePlaces(
         states=n, by=by, branches=sides.rows, lines=extended_program.lines if sent else 0,
-        turns=sent >= Sent.TURNS,
+        turns=sent >= Sent.TURNS, driven=len(sides.source.driven),
     )  # fmt: skip
     places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
+    saltation = Saltation(source=source, sides=sides, places=places, seeds=seeds)
+    ends = MemoryEnds(
+        source=source, sides=sides, places=places, seeds=seeds, turns=saltation.turns,
+        returning=saltation.returning,
+    )  # fmt: skip
     maker = _Maker(
         source=source, sides=sides, places=places, seeds=seeds, observed=kept,
-        saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
+        saltation=saltation, ends=ends,
     )  # fmt: skip
     outputs = len(combinations) + len(kept)
     schedule = with_derivatives(compiled, extended_program, places.size, outputs * (1 + by), by)
@@ -127,7 +134,8 @@ def with_its_derivatives(
     differentiated.__dict__["equations"] = maker.equations()
     return Differentiated(
         compiled=differentiated, places=places, extended=extended_program, sides=sides,
-        outputs=outputs, saltation=maker.saltation,
+        outputs=outputs, saltation=saltation,
+        touching=len(saltation.turning) + len(ends.guards),
     )  # fmt: skip
 
 
@@ -181,6 +189,7 @@ class _Maker:
     places: StatePlaces
     seeds: Sequence[Direction]
     saltation: Saltation
+    ends: MemoryEnds
     observed: Sequence[int]
 
     def program(self) -> Program:
@@ -193,7 +202,8 @@ class _Maker:
         first = places.kept + self.sides.first_memory
         guards[:0] = [owner + 3] * places.lines
         for i, _, _ in before.jumping:
-            jumping += [(i, n, places.together), (i, places.grazing, places.arrived)]
+            jumping += [(i, n, places.together), (i, places.grazing, places.touched)]
+            jumping += [(i, places.number, places.arrived)] if places.lines else []
         if self.sides.watches:
             guards.insert(0, owner)  # a reset by what has jumped says more
             jumping.append((owner, n, places.last))
@@ -201,10 +211,13 @@ class _Maker:
         if turning:
             jumping += [(owner + 1, m, m + 1) for m in turning]
             jumping.append((owner + 1, first, first + len(before.memory)))
+            jumping.append((owner + 1, places.touched, places.number))
             guards.insert(0, owner + 1)  # what else jumps then says more
-        if self.saltation.turning:
+        touching = len(self.saltation.turning) + len(self.ends.guards)
+        if touching:
             jumping.append((owner + 2, places.grazing, places.grazing + 1))
-            guards[:0] = [owner + 2] * len(self.saltation.turning)
+            jumping.append((owner + 2, places.touched, places.cornered))
+            guards[:0] = [owner + 2] * touching
         if places.lines:
             jumping.append((owner + 3, n, places.kept))
             jumping += [(owner + 3, first, first + len(before.memory))] if places.turns else []
@@ -297,14 +310,14 @@ class _Maker:
             for row, array in source.equations.results["g"]
             if source.program.switching <= row < first and array.size
         ]
-        rows = [apart for apart, _ in self.saltation.turning]
+        rows = [*(apart for apart, _ in self.saltation.turning), *self.ends.guards]
         rows += [self.sides.driven] if source.driven else []
         rows += [self.sides.margin] if self.sides.watches else []
         rows += [*self.saltation.returning.guards, *source.guards]
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
-        source = self.source
+        source, places = self.source, self.places
         resets = source.equations.results.get("reset", [])
         pieces = [p for _, array in resets for p in array.pieces()]
         guards: dict[int, list[Expr]] = {}
@@ -318,11 +331,21 @@ class _Maker:
         if reversed_levels:
             pieces += [(e, 1) for e in reversed_levels.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
-        if self.saltation.turning:
+            pieces += [*self._firsts(places.touched, self.ends.touched)]
+            pieces += [*self._firsts(places.cornered, self.ends.cornered)]
+            pieces += [(e, 1) for e in self.ends.stood.values()]
+            pieces += [(e, 1) for e in self.ends.turned.values()]
+        if self.saltation.turning or self.ends.guards:
             pieces.append((self.saltation.at_touch(), 1))
-        if self.places.lines:
+            pieces += self._firsts(places.touched, self.ends.touched)
+        if places.lines:
             pieces += self.saltation.at_arrival()
         return self._rows(0, pieces)
+
+    def _firsts(self, place: int, happens: Mapping[int, Expr]) -> list[SomeRows]:
+        """Return when each of some things has first happened."""
+        rows = enumerate(happens.values())
+        return [(self.saltation.first(place + k, expr), 1) for k, expr in rows]
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:
         graph, count = self.source.graph, len(self.source.program.sampled)

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph
-from .causes import Cause, When
+from .causes import Cause, When, when_of
 from .directions import Direction, SomeRows, Taken
 from .names import StatePlaces
 from .schedule import Sent
@@ -43,6 +43,16 @@ class Returning:
         graph, one, fallen = self.graph, self.graph.const(1.0), self.graph.const(-1.0)
         lines = range(self.places.lines)
         return [graph.op("select", self._arrived(i), fallen, one) for i in lines]
+
+    @property
+    def _rounding(self) -> Expr:
+        """How close break points of t are that are passed at once."""
+        return self.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
+
+    @cached_property
+    def when(self) -> When:
+        """How the time moves at which jumps leave delays."""
+        return when_of(self.graph, self.causes, self.places.by, self._rounding)
 
     @property
     def arrives(self) -> Expr | None:

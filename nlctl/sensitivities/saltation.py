@@ -77,8 +77,8 @@ class Saltation:
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
         rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
         sent_rows = behind_all[len(rows) + 3 :]
-        rows.append((self._first(places.together, apart[0]), 1))
-        rows.append((self._first(places.grazing, grazes[0]), 1))
+        rows.append((self.first(places.together, apart[0]), 1))
+        rows.append((self.first(places.grazing, grazes[0]), 1))
         rows.append((self._lost_in_delay(jumped[0]), 1))
         return [*rows, *sent_rows]
 
@@ -148,11 +148,11 @@ class Saltation:
         for m, kept in self.sides.memories.items():
             (stands,) = self.sides.kept([rows.get(m, kept)])
             after.append((graph.leaf("x", m, None) if m in source.switched else stands, 1))
-        after.append((self._first(places.grazing, when.grazes), 1))
+        after.append((self.first(places.grazing, when.grazes), 1))
         moves = self.returning.counts(when, sent)
         after.append((self._lost_in_delay(self._any(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
-        after.append((self._first(places.at_reset, together), 1))
+        after.append((self.first(places.at_reset, together), 1))
         brought = self._brought(before, when.moves)
         now = [line[0] for line in later]
         return [*after, *self.returning.sent(moves, earlier, now, when.moves, brought)]
@@ -171,7 +171,7 @@ class Saltation:
     def at_arrival(self) -> list[SomeRows]:
         """Return what follows the states where a jump leaves a delay."""
         source, graph, returning = self.source, self.source.graph, self.returning
-        when, before = self._when_arrived, self._before_all
+        when, before = self.returning.when, self._before_all
         behind = source.moving(source.flow, source.committed)
         driving, rows = returning.earlier(self._driving), []
         for j, move in enumerate(when.moves):
@@ -185,7 +185,7 @@ class Saltation:
             rows += [(graph.op("select", when.apart, graph.const(0.0), s), n) for s, n in states]
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
-        rows.append((self._first(self.places.together, when.apart), 1))
+        rows.append((self.first(self.places.together, when.apart), 1))
         arriving = self._earlier(source.single_arriving)
         sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
         sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
@@ -193,12 +193,6 @@ class Saltation:
         brought = self._brought(before, when.moves)
         rows += returning.sent(moves, arriving, source.single_arriving, when.moves, brought)
         return [*rows, *returning.arrived]
-
-    @property
-    def _when_arrived(self) -> When:
-        """Return how the time moves at which jumps leave delays."""
-        causes = self.returning.causes
-        return when_of(self.source.graph, causes, self.places.by, self._rounding)
 
     def _earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
         """Return expressions as they were before jumps, those that have just left delays, too."""
@@ -215,7 +209,7 @@ class Saltation:
     def _lost_in_delay(self, moves: Expr) -> Expr:
         """Return when a jump whose time moves was first sent through delays that do not keep it."""
         never = self.source.graph.const(False)
-        return self._first(self.places.jumped, never if self.places.lines else moves)
+        return self.first(self.places.jumped, never if self.places.lines else moves)
 
     @cached_property
     def returning(self) -> Returning:
@@ -258,10 +252,10 @@ class Saltation:
         graph, touched = self.source.graph, self.source.graph.const(False)
         for _, touch in self.turning:
             touched = graph.op("or", touched, touch)
-        return self._first(self.places.grazing, touched)
+        return self.first(self.places.grazing, touched)
 
     @cached_property
-    def _turns(self) -> DrivenMemories:
+    def turns(self) -> DrivenMemories:
         """Derivatives of memories that are driven."""
         return DrivenMemories(
             source=self.source, sides=self.sides, places=self.places, seeds=self.seeds
@@ -275,7 +269,7 @@ class Saltation:
         """Return what derivatives of memories become where these turn, by their states."""
         places, driven = self.places, self.source.driven
         return {
-            places.derivative(j) + m: self._turns.kept(j, m, at_turn=True)
+            places.derivative(j) + m: self.turns.kept(j, m, at_turn=True)
             for j in range(places.by)
             for m in driven
         }
@@ -294,7 +288,7 @@ class Saltation:
         for _, size in self.source.flow:
             pieces.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return rows_replaced(graph, pieces, {m: self._turns.kept(j, m) for m in self.source.driven})
+        return rows_replaced(graph, pieces, {m: self.turns.kept(j, m) for m in self.source.driven})
 
     def _jumped(
         self,
@@ -446,7 +440,7 @@ class Saltation:
         least = graph.op("mul", graph.const(_NOTICED), extent)
         return graph.op("gt", apart, least if unseen is None else graph.op("add", least, unseen))
 
-    def _first(self, place: int, happens: Expr) -> Expr:
+    def first(self, place: int, happens: Expr) -> Expr:
         """Return when something has first happened, now at the latest if it does."""
         graph = self.source.graph
         earlier, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
@@ -494,7 +488,7 @@ class Saltation:
         by_jumps = (
             by_jumps
             if arrived is None
-            else self._when_arrived.unless(graph.op("not", arrived), by_jumps, graph)
+            else self.returning.when.unless(graph.op("not", arrived), by_jumps, graph)
         )
         left = graph.op("lt", self.sides.margin, graph.const(0.0))
         together = graph.op("select", fell, left, by_jumps.apart)

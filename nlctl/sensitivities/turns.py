@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..errors import CompileError
 from ..expressions.dependence import rows_read
 from ..expressions.graph import Expr, needed
-from .corners import at_corner, corners_of
+from .causes import Cause, when_of
+from .corners import Corner, at_corner, corners_of
 from .directions import Direction
 from .names import StatePlaces
 from .sides import KeptSides
 from .source import EquationParts
+
+
+_FAR = 5e5  # a memory that is driven is kept at least so far away
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,46 +28,78 @@ class DrivenMemories:
     sides: KeptSides
     places: StatePlaces
     seeds: Sequence[Direction]
+    _known_corners: dict[Expr, list[Corner]] = field(default_factory=dict)
 
     def kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
         """Return the derivative of a memory, which is integrated only while it is not driven."""
-        # A step ends a little behind where it has reversed.
-        graph = self.source.graph
-        kept = self.sides.memories[m]
-        become = self.source.driven[m]
-        (change,) = self.source.slopes([become], self.seeds[j])
-        derivative = graph.const(0.0) if change is None else change
-        if at_turn and change is not None:
-            flowing = self.source.flowing(self.source.flow, self.seeds)
-            forward = self.source.time(flowing, delays_move=False)
-            (rate,) = self.source.slopes([change], forward)
-            recent, late = self._late(become)
-            if rate is not None:
-                late = graph.op("select", recent, late, graph.const(0.0))
-                derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
-            if self._is_moved_by_delay(j, become):
-                # a break of an input, whose time moves behind the delay as that does
-                scale = graph.leaf("p", self.source.extended.slot("scale").offset + j, None)
-                (rate,) = self.source.changes([become], forward)
-                moved = graph.op("add", derivative, graph.op("mul", scale, rate))
-                derivative = graph.op("select", recent, derivative, moved)
-        if at_turn and m in self._at_corners:
-            here, there = self._at_corners[m]
-            derivative = graph.op("select", here, there[j], derivative)
+        graph, become = self.source.graph, self.source.driven[m]
+        derivative = self.turned(become, j) if at_turn else self._change(become, j)
         (derivative,) = self.sides.kept([derivative])
-        moved = graph.op("ne", graph.leaf("x", m, None), kept)
+        # it stays as it was where it begins to be driven
+        moved = self.has_turned(m) if at_turn else self._has_moved(m)
         integrated = graph.leaf("x", self.places.derivative(j) + m, None)
         return graph.op("select", moved, derivative, integrated)
 
+    def turned(self, level: Expr, j: int) -> Expr:
+        """Return the derivative of a number where that turns."""
+        # A step ends a little behind that.
+        source, graph = self.source, self.source.graph
+        derivative = change = self._change(level, j)
+        forward = source.time(source.flowing(source.flow, self.seeds), delays_move=False)
+        recent, late = self._late(level)
+        (rate,) = source.slopes([change], forward)
+        if rate is not None:
+            late = graph.op("select", recent, late, graph.const(0.0))
+            derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
+        if self._is_moved_by_delay(j, level):
+            # a break of an input, whose time moves behind the delay as that does
+            scale = graph.leaf("p", source.extended.slot("scale").offset + j, None)
+            (rate,) = source.changes([level], forward)
+            moved = graph.op("add", derivative, graph.op("mul", scale, rate))
+            derivative = graph.op("select", recent, derivative, moved)
+        corners = self._corners(level)
+        if corners:
+            here, there = at_corner(source, level, corners, self.seeds)
+            derivative = graph.op("select", here, there[j], derivative)
+        return derivative
+
+    def _change(self, level: Expr, j: int) -> Expr:
+        return self.source.changes([level], self.seeds[j])[0]
+
+    def _has_moved(self, m: int) -> Expr:
+        return self.source.graph.op(
+            "ne", self.source.graph.leaf("x", m, None), self.sides.memories[m]
+        )
+
+    def has_turned(self, m: int) -> Expr:
+        """Return whether a memory has been moved, and is not being moved any more."""
+        graph = self.source.graph
+        stands = graph.op("not", self.is_far(m, graph.leaf("x", m, None)))
+        return graph.op("and", self._has_moved(m), stands)
+
+    def is_far(self, m: int, kept: Expr) -> Expr:
+        """Return whether a memory is kept far away from where it is moved."""
+        graph = self.source.graph
+        gap = graph.op("sub", kept, self.source.driven[m])
+        return graph.op("gt", graph.op("absolute", gap), graph.const(_FAR))
+
     @cached_property
-    def _at_corners(self) -> dict[int, tuple[Expr, list[Expr]]]:
-        """Return of memories that corners may drive whether one does, and what they keep then."""
-        source, kept = self.source, {}
-        for m, become in source.driven.items():
-            corners = corners_of(source, become, self.seeds, self._longest)
-            if corners:
-                kept[m] = at_corner(source, become, corners, self.seeds)
-        return kept
+    def corners_apart(self) -> dict[int, Expr]:
+        """Whether memories are driven by two corners now, each of which moves otherwise."""
+        graph, slot = self.source.graph, self.source.extended.slot("rounding")
+        rounding, no, apart = graph.leaf("p", slot.offset, None), graph.const(False), {}
+        for m, become in self.source.driven.items():
+            causes = [Cause(met=c.here, moves=c.moves, grazes=no) for c in self._corners(become)]
+            if len(causes) > 1:
+                apart[m] = when_of(graph, causes, self.places.by, rounding).apart
+        return apart
+
+    def _corners(self, level: Expr) -> list[Corner]:
+        """Return the corners of a number."""
+        if level not in self._known_corners:
+            corners = corners_of(self.source, level, self.seeds, self._longest)
+            self._known_corners[level] = corners
+        return self._known_corners[level]
 
     @property
     def _longest(self) -> Expr:
