@@ -1,7 +1,7 @@
 """Memories that have two derivatives: touched at their end and no further, or at two corners.
 
-A play whose input comes to the end of its gap and goes back from there is moved by the least change
-of one sign, and not by one of the other.  So is one that has been moved by as little as nobody
+A play whose input comes to the end of its gap, and back from a corner there, is moved by the least
+change of one sign, and not by one of the other.  So is one that has been moved by as little as nobody
 sees.  Unless what touches it moves as it does itself: the crests of a periodic input all touch the
 memory that the first has left.
 """
@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial, reduce
 
-from ..expressions.conditions import conditions, switching_function
-from ..expressions.graph import Expr, Graph, needed
+from ..expressions.conditions import conditions
+from ..expressions.dependence import reads
+from ..expressions.graph import Expr, Graph
 from .directions import Direction
 from .names import StatePlaces
 from .returning import Returning
@@ -21,7 +22,6 @@ from .sides import KeptSides
 from .source import EquationParts
 from .turns import DrivenMemories
 
-_STILL = 1e-4  # of what is known of a number, in the time in which a turn is seen: a rest
 _AGREE = 1e-4  # derivatives that are one
 _SEEN = 1e2  # times what is known of a derivative: by less two of them do not differ
 
@@ -47,52 +47,61 @@ class MemoryEnds:
         """Memories, how far each is from an end, and the rate of that."""
         forward, contacts = self.source.time(self.source.flow), []
         for m, become in self.source.driven.items():
-            levels = [level for node in conditions([become]) for level in self._of(m, node)]
-            for level in dict.fromkeys(levels):
-                (rate,) = self.source.slopes([level], forward)
-                contacts += [] if rate is None else [(m, level, rate)]
+            gaps = [gap for node in conditions([become]) for gap in self._gaps(m, node)]
+            for gap in dict.fromkeys(gaps):
+                (rate,) = self.source.slopes([gap], forward)
+                contacts += [] if rate is None else [(m, gap, rate)]
         return contacts
 
-    def _of(self, m: int, node: Expr) -> list[Expr]:
-        """Return the switching functions of a condition that are of a memory."""
-        level, functions = switching_function(self.graph, node), []
-        for leaf in needed([level]):
-            if leaf.op == "leaf" and leaf.data[0] == "x" and leaf.size in (None, level.size):
-                _, start, step = leaf.data
-                functions += [
-                    self.graph.item(level, k)
-                    for k in range(level.size or 1)
-                    if start + step * (k if leaf.size else 0) == m
-                ]
-        return functions
+    def _gaps(self, m: int, node: Expr) -> list[Expr]:
+        """Return how far from an end a memory is by a `max` or `min` of it: not below 0."""
+        if node.op not in ("maximum", "minimum"):
+            return []
+        gaps: list[Expr] = []
+        for k in range(node.size or 1):
+            one, other = (self.graph.item(self.graph.number(arg), k) for arg in node.args)
+            is_first = reads([one], "x", [m])
+            if is_first != reads([other], "x", [m]):
+                larger = is_first == (node.op == "maximum")
+                pair = (one, other) if larger else (other, one)
+                gaps.append(self.graph.op("sub", *pair))
+        return gaps
 
     @cached_property
     def guards(self) -> list[Expr]:
-        """What falls through 0 where the input of a memory that stands turns."""
-        # By its rate alone: where a memory comes to its end and further, nothing falls.
-        graph, guards = self.graph, []
-        for m, rate in dict.fromkeys((m, rate) for m, _, rate in self.contacts):
-            least = graph.op("mul", graph.const(_STILL), graph.op("div", self._noise(m), self._late))
-            driven = self.turns.is_far(m, graph.leaf("x", m, None))
-            for op in ("sub", "add"):
-                turns = graph.op(op, least, rate)
-                guards.append(graph.op("select", driven, graph.const(1.0), turns))
-        return guards
+        """What falls below 0 at a corner at which a memory stands right at an end."""
+        # A function of the rate would find smooth turns as well, but steps follow what they look
+        # at, and those of a closed loop with a play become ten times as many.
+        graph = self.graph
+        one, fallen = graph.const(1.0), graph.const(-1.0)
+        here = (self._stands_at(m, gap) for m, gap, _ in self.contacts)
+        return [graph.op("select", at_end, fallen, one) for at_end in here if at_end is not None]
+
+    def _stands_at(self, m: int, gap: Expr) -> Expr | None:
+        """Return whether a memory stands right at an end at a corner, None if there is none."""
+        graph, corners = self.graph, [corner.here for corner in self.turns.corners(gap)]
+        if reads([gap], "u", self.source.delayed) and self.returning.arrives is not None:
+            corners.append(self.returning.arrives)
+        if not corners:
+            return None
+        stands = graph.op("eq", graph.leaf("x", m, None), self.sides.memories[m])
+        within = graph.op("le", graph.op("absolute", gap), self._noise(m))
+        still = graph.op("not", self._has_just_turned(m))
+        parts = (reduce(partial(graph.op, "or"), corners), stands, within, still)
+        return reduce(partial(graph.op, "and"), parts)
 
     @cached_property
     def touched(self) -> dict[int, Expr]:
         """Whether each memory has two derivatives now, as it is touched, or hardly moved."""
         graph, touched = self.graph, self._hardly_moved
-        for m, level, rate in self.contacts:
-            stands = graph.op("eq", graph.leaf("x", m, None), self.sides.memories[m])
-            stands = graph.op("and", stands, graph.op("not", self._has_just_turned(m)))
-            near = graph.op("le", graph.op("absolute", level), self._noise(m))
-            pairs = []
+        for m, gap, rate in self.contacts:
+            at_end, pairs = self._stands_at(m, gap), []
+            if at_end is None:
+                continue
             for j in range(self.places.by):
                 memory = self._derivative(j, m)
-                pairs.append((memory, graph.op("sub", memory, self._change(j, level, rate))))
-            here = graph.op("and", stands, near)
-            here = graph.op("and", here, self._any_differs(pairs))
+                pairs.append((memory, graph.op("sub", memory, self._change(j, gap, rate))))
+            here = graph.op("and", at_end, self._any_differs(pairs))
             touched[m] = graph.op("or", touched[m], here)
         return touched
 

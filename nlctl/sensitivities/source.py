@@ -188,7 +188,7 @@ class EquationParts:
         """Return the direction in which everything goes with these rates of the states."""
         # By `time`, 1 if it is None. Rates of delayed signals that are not known are refused, and
         # count as 0 unless `delays_move`.
-        lines = range(self.inputs, self.inputs + (self.extended.lines if delays_move else 0))
+        lines = self.delayed if delays_move else range(0)
         outside = from_time(self.graph, time, lines, self._row_of_rate)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
@@ -244,8 +244,12 @@ class EquationParts:
     def _reads_delays(self, exprs: Sequence[Expr]) -> bool:
         """Return whether expressions, or their rates, are made of what leaves delays."""
         rates = self.changes(exprs, self.time(self.flow, delays_move=False))
-        lines = range(self.inputs, self.inputs + self.extended.lines)
-        return reads([*exprs, *rates], "u", lines)
+        return reads([*exprs, *rates], "u", self.delayed)
+
+    @property
+    def delayed(self) -> range:
+        """The rows of the inputs that leave delays."""
+        return range(self.inputs, self.inputs + self.extended.lines)
 
     def flowing(self, flow: Sequence[SomeRows], seeds: Sequence[Direction]) -> list[SomeRows]:
         """Return rates of the states, and behind them those of their derivatives."""

@@ -57,7 +57,7 @@ class DrivenMemories:
             (rate,) = source.changes([level], forward)
             moved = graph.op("add", derivative, graph.op("mul", scale, rate))
             derivative = graph.op("select", recent, derivative, moved)
-        corners = self._corners(level)
+        corners = self.corners(level)
         if corners:
             here, there = at_corner(source, level, corners, self.seeds)
             derivative = graph.op("select", here, there[j], derivative)
@@ -89,12 +89,12 @@ class DrivenMemories:
         graph, slot = self.source.graph, self.source.extended.slot("rounding")
         rounding, no, apart = graph.leaf("p", slot.offset, None), graph.const(False), {}
         for m, become in self.source.driven.items():
-            causes = [Cause(met=c.here, moves=c.moves, grazes=no) for c in self._corners(become)]
+            causes = [Cause(met=c.here, moves=c.moves, grazes=no) for c in self.corners(become)]
             if len(causes) > 1:
                 apart[m] = when_of(graph, causes, self.places.by, rounding).apart
         return apart
 
-    def _corners(self, level: Expr) -> list[Corner]:
+    def corners(self, level: Expr) -> list[Corner]:
         """Return the corners of a number."""
         if level not in self._known_corners:
             corners = corners_of(self.source, level, self.seeds, self._longest)
