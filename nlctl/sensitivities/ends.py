@@ -1,8 +1,8 @@
 """Memories that have two derivatives: touched at their end and no further, or at two corners.
 
 A play whose input comes to the end of its gap, and back from a corner there, is moved by the least
-change of one sign, and not by one of the other.  So is one that has been moved by as little as nobody
-sees.  Unless what touches it moves as it does itself: the crests of a periodic input all touch the
+change of one sign, and not by one of the other.  So is one that has been moved by as little as
+nobody sees.  Unless what touches it moves as it does itself: the crests of a periodic input all touch the
 memory that the first has left.
 """
 
@@ -22,6 +22,7 @@ from .sides import KeptSides
 from .source import EquationParts
 from .turns import DrivenMemories
 
+_NEVER = 1e300  # s
 _AGREE = 1e-4  # derivatives that are one
 _SEEN = 1e2  # times what is known of a derivative: by less two of them do not differ
 
@@ -91,7 +92,7 @@ class MemoryEnds:
         return reduce(partial(graph.op, "and"), parts)
 
     @cached_property
-    def touched(self) -> dict[int, Expr]:
+    def _touched(self) -> dict[int, Expr]:
         """Whether each memory has two derivatives now, as it is touched, or hardly moved."""
         graph, touched = self.graph, self._hardly_moved
         for m, gap, rate in self.contacts:
@@ -110,7 +111,7 @@ class MemoryEnds:
         """Whether each memory has just turned, with another derivative than where it stood."""
         graph, hardly = self.graph, {}
         for m in self.source.driven:
-            gone = graph.op("sub", graph.leaf("x", m, None), self.stood[m])
+            gone = graph.op("sub", graph.leaf("x", m, None), self._stood[m])
             near = graph.op("le", graph.op("absolute", gone), self._noise(m))
             pairs = [
                 (self.turns.kept(j, m, at_turn=True), self._derivative(j, m))
@@ -120,17 +121,22 @@ class MemoryEnds:
             hardly[m] = graph.op("and", here, self._any_differs(pairs))
         return hardly
 
-    @cached_property
-    def cornered(self) -> dict[int, Expr]:
-        """Whether each memory has just turned at two corners at once."""
-        no, apart = self.graph.const(False), self.turns.corners_apart
-        return {
-            m: self.graph.op("and", self.turns.has_turned(m), apart.get(m, no))
-            for m in self.source.driven
-        }
+    @property
+    def _when_cornered(self) -> list[Expr]:
+        """When each memory has first turned at two corners at once."""
+        no, apart, when = self.graph.const(False), self.turns.corners_apart, []
+        for k, m in enumerate(self.source.driven):
+            here = self.graph.op("and", self.turns.has_turned(m), apart.get(m, no))
+            when.append(self._first(self.graph.leaf("x", self.places.cornered + k, None), here))
+        return when
+
+    def _first(self, before: Expr, happens: Expr) -> Expr:
+        """Return when something has first happened, now at the latest if it does."""
+        earlier = self.graph.op("minimum", before, self.graph.leaf("t", 0, None))
+        return self.graph.op("select", happens, earlier, before)
 
     @cached_property
-    def stood(self) -> dict[int, Expr]:
+    def _stood(self) -> dict[int, Expr]:
         """Where each memory stood before it was moved."""
         graph, stood = self.graph, {}
         for k, m in enumerate(self.source.driven):
@@ -139,29 +145,48 @@ class MemoryEnds:
             stood[m] = graph.op("select", self.turns.is_far(m, kept), before, kept)
         return stood
 
-    @cached_property
-    def turned(self) -> dict[int, Expr]:
+    @property
+    def _turned(self) -> list[Expr]:
         """When each memory has last turned."""
-        graph, now = self.graph, self.graph.leaf("t", 0, None)
-        return {
-            m: graph.op("select", self.turns.has_turned(m), now, self._last_turn(m))
-            for m in self.source.driven
-        }
+        graph, place = self.graph, self.places.turned
+        now = graph.leaf("t", 0, None)
+        return [
+            graph.op("select", self.turns.has_turned(m), now, graph.leaf("x", place + k, None))
+            for k, m in enumerate(self.source.driven)
+        ]
 
-    def _last_turn(self, m: int) -> Expr:
-        place = self.places.turned + list(self.source.driven).index(m)
-        return self.graph.leaf("x", place, None)
+    @property
+    def when_touched(self) -> list[Expr]:
+        """When each memory was first touched."""
+        return [self._when_touched(k, m) for k, m in enumerate(self.source.driven)]
+
+    @property
+    def at_turns(self) -> list[Expr]:
+        """What is kept of the memories from `StatePlaces.touched` on where one turns."""
+        return [
+            *self.when_touched, *self._when_cornered, *self._stood.values(), *self._turned
+        ]  # fmt: skip
+
+    def _when_touched(self, k: int, m: int) -> Expr:
+        # In an algebraic loop one that comes to its end may first seem to stand there again.
+        graph = self.graph
+        before = graph.leaf("x", self.places.touched + k, None)
+        first = self._first(before, self._touched[m])
+        moves = self.turns.is_far(m, graph.leaf("x", m, None))
+        mistaken = graph.op("and", moves, self._is_recent(before))
+        return graph.op("select", mistaken, graph.const(_NEVER), first)
 
     def _has_just_turned(self, m: int) -> Expr:
         """Return whether a memory is near its end since it has turned there."""
-        graph = self.graph
-        ago = graph.op("sub", graph.leaf("t", 0, None), self._last_turn(m))
-        return graph.op("le", graph.op("absolute", ago), self._late)
+        place = self.places.turned + list(self.source.driven).index(m)
+        return self._is_recent(self.graph.leaf("x", place, None))
 
-    @property
-    def _late(self) -> Expr:
-        """How long behind a turn a step may end."""
-        return self.graph.leaf("p", self.source.extended.slot("late").offset, None)
+    def _is_recent(self, time: Expr) -> Expr:
+        """Return whether a time is no longer ago than a step may end behind a turn."""
+        graph = self.graph
+        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), time))
+        late = graph.leaf("p", self.source.extended.slot("late").offset, None)
+        return graph.op("le", ago, late)
 
     def _derivative(self, j: int, m: int) -> Expr:
         return self.graph.leaf("x", self.places.derivative(j) + m, None)

@@ -7,7 +7,7 @@ with memories and samples what the derivative of these says, and jump at conditi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -331,21 +331,13 @@ class _Maker:
         if reversed_levels:
             pieces += [(e, 1) for e in reversed_levels.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
-            pieces += [*self._firsts(places.touched, self.ends.touched)]
-            pieces += [*self._firsts(places.cornered, self.ends.cornered)]
-            pieces += [(e, 1) for e in self.ends.stood.values()]
-            pieces += [(e, 1) for e in self.ends.turned.values()]
+            pieces += [(e, 1) for e in self.ends.at_turns]
         if self.saltation.turning or self.ends.guards:
             pieces.append((self.saltation.at_touch(), 1))
-            pieces += self._firsts(places.touched, self.ends.touched)
+            pieces += [(e, 1) for e in self.ends.when_touched]
         if places.lines:
             pieces += self.saltation.at_arrival()
         return self._rows(0, pieces)
-
-    def _firsts(self, place: int, happens: Mapping[int, Expr]) -> list[SomeRows]:
-        """Return when each of some things has first happened."""
-        rows = enumerate(happens.values())
-        return [(self.saltation.first(place + k, expr), 1) for k, expr in rows]
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:
         graph, count = self.source.graph, len(self.source.program.sampled)

@@ -77,8 +77,8 @@ class Saltation:
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
         rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
         sent_rows = behind_all[len(rows) + 3 :]
-        rows.append((self.first(places.together, apart[0]), 1))
-        rows.append((self.first(places.grazing, grazes[0]), 1))
+        rows.append((self._first(places.together, apart[0]), 1))
+        rows.append((self._first(places.grazing, grazes[0]), 1))
         rows.append((self._lost_in_delay(jumped[0]), 1))
         return [*rows, *sent_rows]
 
@@ -148,11 +148,11 @@ class Saltation:
         for m, kept in self.sides.memories.items():
             (stands,) = self.sides.kept([rows.get(m, kept)])
             after.append((graph.leaf("x", m, None) if m in source.switched else stands, 1))
-        after.append((self.first(places.grazing, when.grazes), 1))
+        after.append((self._first(places.grazing, when.grazes), 1))
         moves = self.returning.counts(when, sent)
         after.append((self._lost_in_delay(self._any(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
-        after.append((self.first(places.at_reset, together), 1))
+        after.append((self._first(places.at_reset, together), 1))
         brought = self._brought(before, when.moves)
         now = [line[0] for line in later]
         return [*after, *self.returning.sent(moves, earlier, now, when.moves, brought)]
@@ -185,7 +185,7 @@ class Saltation:
             rows += [(graph.op("select", when.apart, graph.const(0.0), s), n) for s, n in states]
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
-        rows.append((self.first(self.places.together, when.apart), 1))
+        rows.append((self._first(self.places.together, when.apart), 1))
         arriving = self._earlier(source.single_arriving)
         sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
         sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
@@ -209,7 +209,7 @@ class Saltation:
     def _lost_in_delay(self, moves: Expr) -> Expr:
         """Return when a jump whose time moves was first sent through delays that do not keep it."""
         never = self.source.graph.const(False)
-        return self.first(self.places.jumped, never if self.places.lines else moves)
+        return self._first(self.places.jumped, never if self.places.lines else moves)
 
     @cached_property
     def returning(self) -> Returning:
@@ -252,7 +252,7 @@ class Saltation:
         graph, touched = self.source.graph, self.source.graph.const(False)
         for _, touch in self.turning:
             touched = graph.op("or", touched, touch)
-        return self.first(self.places.grazing, touched)
+        return self._first(self.places.grazing, touched)
 
     @cached_property
     def turns(self) -> DrivenMemories:
@@ -440,7 +440,7 @@ class Saltation:
         least = graph.op("mul", graph.const(_NOTICED), extent)
         return graph.op("gt", apart, least if unseen is None else graph.op("add", least, unseen))
 
-    def first(self, place: int, happens: Expr) -> Expr:
+    def _first(self, place: int, happens: Expr) -> Expr:
         """Return when something has first happened, now at the latest if it does."""
         graph = self.source.graph
         earlier, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)

@@ -16,7 +16,6 @@ from .names import StatePlaces
 from .sides import KeptSides
 from .source import EquationParts
 
-
 _FAR = 5e5  # a memory that is driven is kept at least so far away
 
 

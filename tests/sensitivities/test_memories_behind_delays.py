@@ -130,7 +130,7 @@ def test_play_behind_a_delay_of_what_jumps(by, start):
     loop = connected(plant, wire(D), gap(r), outputs=["v"])
     x0, t = 0.1, (P - 0.1) / rate + D + 0.02
     made = nlctl.sensitivity_response(
-        loop, [0, t], 0, {"source.x": x0, "gap.memory": -0.1}, with_respect_to=[by, "source.P"]
+        loop, [0, t], 0, {"source.x": x0, "gap.memory": -0.15}, with_respect_to=[by, "source.P"]
     )
     behind = height > 2 * r + 0.1  # pushed to the other side of the gap, and left there
     assert made.values[0, -1] == pytest.approx(P - height + r if behind else P - r)
