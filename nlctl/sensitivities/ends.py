@@ -2,8 +2,8 @@
 
 A play whose input comes to the end of its gap, and back from a corner there, is moved by the least
 change of one sign, and not by one of the other.  So is one that has been moved by as little as
-nobody sees.  Unless what touches it moves as it does itself: the crests of a periodic input all touch the
-memory that the first has left.
+nobody sees.  Unless what touches it moves as it does itself: the crests of a periodic input all
+touch the memory that the first has left.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from .sides import KeptSides
 from .source import EquationParts
 from .turns import DrivenMemories
 
-_NEVER = 1e300  # s
 _AGREE = 1e-4  # derivatives that are one
 _SEEN = 1e2  # times what is known of a derivative: by less two of them do not differ
 
@@ -78,18 +77,22 @@ class MemoryEnds:
         here = (self._stands_at(m, gap) for m, gap, _ in self.contacts)
         return [graph.op("select", at_end, fallen, one) for at_end in here if at_end is not None]
 
+    def _at_corner(self, number: Expr) -> Expr | None:
+        """Return whether a number is at a corner, None if it has none."""
+        corners = [corner.here for corner in self.turns.corners(number)]
+        if reads([number], "u", self.source.delayed) and self.returning.arrives is not None:
+            corners.append(self.returning.arrives)
+        return reduce(partial(self.graph.op, "or"), corners) if corners else None
+
     def _stands_at(self, m: int, gap: Expr) -> Expr | None:
         """Return whether a memory stands right at an end at a corner, None if there is none."""
-        graph, corners = self.graph, [corner.here for corner in self.turns.corners(gap)]
-        if reads([gap], "u", self.source.delayed) and self.returning.arrives is not None:
-            corners.append(self.returning.arrives)
-        if not corners:
+        graph, corner = self.graph, self._at_corner(gap)
+        if corner is None:
             return None
         stands = graph.op("eq", graph.leaf("x", m, None), self.sides.memories[m])
         within = graph.op("le", graph.op("absolute", gap), self._noise(m))
         still = graph.op("not", self._has_just_turned(m))
-        parts = (reduce(partial(graph.op, "or"), corners), stands, within, still)
-        return reduce(partial(graph.op, "and"), parts)
+        return reduce(partial(graph.op, "and"), (corner, stands, within, still))
 
     @cached_property
     def _touched(self) -> dict[int, Expr]:
@@ -108,7 +111,7 @@ class MemoryEnds:
 
     @property
     def _hardly_moved(self) -> dict[int, Expr]:
-        """Whether each memory has just turned, with another derivative than where it stood."""
+        """Whether each memory turns at a corner right where it stood, by another derivative."""
         graph, hardly = self.graph, {}
         for m in self.source.driven:
             gone = graph.op("sub", graph.leaf("x", m, None), self._stood[m])
@@ -117,8 +120,10 @@ class MemoryEnds:
                 (self.turns.kept(j, m, at_turn=True), self._derivative(j, m))
                 for j in range(self.places.by)
             ]
-            here = graph.op("and", self.turns.has_turned(m), near)
-            hardly[m] = graph.op("and", here, self._any_differs(pairs))
+            corner = self._at_corner(self.source.driven[m])
+            parts = (self.turns.has_turned(m), near, self._any_differs(pairs))
+            here = reduce(partial(graph.op, "and"), parts)
+            hardly[m] = graph.const(False) if corner is None else graph.op("and", corner, here)
         return hardly
 
     @property
@@ -158,7 +163,9 @@ class MemoryEnds:
     @property
     def when_touched(self) -> list[Expr]:
         """When each memory was first touched."""
-        return [self._when_touched(k, m) for k, m in enumerate(self.source.driven)]
+        places = enumerate(self.source.driven, self.places.touched)
+        leaves = ((self.graph.leaf("x", place, None), m) for place, m in places)
+        return [self._first(before, self._touched[m]) for before, m in leaves]
 
     @property
     def at_turns(self) -> list[Expr]:
@@ -166,15 +173,6 @@ class MemoryEnds:
         return [
             *self.when_touched, *self._when_cornered, *self._stood.values(), *self._turned
         ]  # fmt: skip
-
-    def _when_touched(self, k: int, m: int) -> Expr:
-        # In an algebraic loop one that comes to its end may first seem to stand there again.
-        graph = self.graph
-        before = graph.leaf("x", self.places.touched + k, None)
-        first = self._first(before, self._touched[m])
-        moves = self.turns.is_far(m, graph.leaf("x", m, None))
-        mistaken = graph.op("and", moves, self._is_recent(before))
-        return graph.op("select", mistaken, graph.const(_NEVER), first)
 
     def _has_just_turned(self, m: int) -> Expr:
         """Return whether a memory is near its end since it has turned there."""

@@ -147,3 +147,77 @@ def test_narrow_functions_are_followed(method):
     by = ["hill.R", "hill.c", "hill.d"]
     made = nlctl.sensitivity_response(hill, [0, 3.0], with_respect_to=by, method=method)
     assert made.derivatives[0, :, -1] == pytest.approx([-np.sqrt(np.pi) / R**2, 0, 0], abs=1e-5)
+
+
+TENTS = {
+    "of t": lambda t, x, u, p: [p["A"] - np.abs(t - p["P"])],
+    "of a state": lambda t, x, u, p: [p["A"] - np.abs(x[0] - p["P"])],
+}
+
+
+@pytest.mark.parametrize("above", [0.0, 1e-4, -1e-4])
+@pytest.mark.parametrize("delay", [None, 0.2])
+@pytest.mark.parametrize("law", TENTS)
+def test_memory_that_is_touched_at_a_corner(law, delay, above):
+    """The tip A of a tent comes to A - r, where the memory stands: v = max(m, A - r) from then."""
+    gap = nlctl.block(
+        nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.5), "gap",
+        inputs=["u" if delay is None else "s"], outputs=["v"],
+    )  # fmt: skip
+    parts = [source(TENTS[law], {"A": A, "P": P}), gap]
+    if delay is not None:
+        line = nlctl.TransportDelay(inputs=("u",), outputs=("s",), delay=delay, before=A - P)
+        parts.append(nlctl.block(line, "wire"))
+    loop = nlctl.interconnect(parts, inputs=[], outputs=["v"], name="loop")
+    tip, by = P + (delay or 0.0), ["source.A", "gap.c_r", "gap.memory(0)"]
+    made = nlctl.sensitivity_response(
+        loop, [0, tip - 0.1, tip + 0.2], 0, {"gap.memory": 0.5 + above}, with_respect_to=by
+    )
+    assert made.values[0] == pytest.approx([0.5 + above, 0.5 + above, 0.5 + max(above, 0.0)])
+    assert np.allclose(made.derivatives[0, :, 1], [0, 0, 1], rtol=0, atol=1e-9)
+    if above:
+        slopes = [0, 0, 1] if above > 0 else [1, -1, 0]
+        assert made.derivatives[0, :, 2] == pytest.approx(slopes, abs=1e-7)
+        return
+    (lack,) = made.missing
+    assert lack.time == pytest.approx(tip, abs=1e-6)
+    assert lack.where == "memory of 'gap'"
+    assert "touched at its end" in lack.why
+    assert np.isnan(made.derivatives[0, :, 2]).all()
+
+
+def test_tips_that_touch_what_the_first_has_left():
+    """All tips of a wave reach as far, also if that is changed: v = A - r from the first on."""
+    loop = nlctl.interconnect(
+        [source(lambda t, x, u, p: [p["A"] * (1 - np.abs(np.sin(t)))], {"A": A}),
+         nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.6, c_l=-0.6), "gap",
+                     inputs=["u"], outputs=["v"])],
+        inputs=[], outputs=["v"], name="loop",
+    )  # fmt: skip
+    made = nlctl.sensitivity_response(
+        loop, np.arange(0, 12, 2.0), with_respect_to=["source.A", "gap.c_r"]
+    )
+    assert not made.missing
+    assert np.allclose(made["v", "source.A"], 1, rtol=0, atol=1e-7)
+    assert np.allclose(made["v", "gap.c_r"], -1, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05])
+def test_two_corners_at_once(apart):
+    """v = A - |Q - P| - r from the top of A - |t - P| - |x - Q| on, which has a corner at Q = P."""
+    loop = nlctl.interconnect(
+        [source(lambda t, x, u, p: [p["A"] - np.abs(t - p["P"]) - np.abs(x[0] - p["Q"])],
+                {"A": A, "P": P, "Q": P + apart}),
+         nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3), "gap",
+                     inputs=["u"], outputs=["v"])],
+        inputs=[], outputs=["v"], name="loop",
+    )  # fmt: skip
+    by = ["source.A", "source.P", "source.Q"]
+    made = nlctl.sensitivity_response(loop, [0, P + 0.2], with_respect_to=by)
+    assert made.values[0, -1] == pytest.approx(A - apart - 0.3)
+    if apart:
+        assert made.derivatives[0, :, -1] == pytest.approx([1, 1, -1], abs=1e-7)
+        return
+    (lack,) = made.missing
+    assert lack.time == pytest.approx(P, abs=1e-6)
+    assert "two corners" in lack.why
