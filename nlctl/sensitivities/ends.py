@@ -16,8 +16,8 @@ from ..expressions.conditions import conditions
 from ..expressions.dependence import reads
 from ..expressions.graph import Expr, Graph
 from .directions import Direction
+from .happenings import Happenings
 from .names import StatePlaces
-from .returning import Returning
 from .sides import KeptSides
 from .source import EquationParts
 from .turns import DrivenMemories
@@ -35,7 +35,7 @@ class MemoryEnds:
     places: StatePlaces
     seeds: Sequence[Direction]
     turns: DrivenMemories
-    returning: Returning
+    when: Happenings
 
     @property
     def graph(self) -> Graph:
@@ -80,8 +80,8 @@ class MemoryEnds:
     def _at_corner(self, number: Expr) -> Expr | None:
         """Return whether a number is at a corner, None if it has none."""
         corners = [corner.here for corner in self.turns.corners(number)]
-        if reads([number], "u", self.source.delayed) and self.returning.arrives is not None:
-            corners.append(self.returning.arrives)
+        if reads([number], "u", self.source.delayed) and self.when.returning.arrives is not None:
+            corners.append(self.when.returning.arrives)
         return reduce(partial(self.graph.op, "or"), corners) if corners else None
 
     def _stands_at(self, m: int, gap: Expr) -> Expr | None:
@@ -192,11 +192,11 @@ class MemoryEnds:
     def _change(self, j: int, level: Expr, rate: Expr) -> Expr:
         """Return the derivative of a level at the time at which it turns."""
         graph, change = self.graph, self.turns.turned(level, j)
-        arrives = self.returning.arrives
+        arrives = self.when.returning.arrives
         if arrives is None:
             return change
         (now,) = self.source.changes([level], self.seeds[j])
-        move = self.returning.when.moves[j]
+        move = self.when.returning.when.moves[j]
         there = graph.op("add", now, graph.op("mul", rate, move))
         return graph.op("select", arrives, there, change)
 
@@ -206,16 +206,10 @@ class MemoryEnds:
         for one, other in pairs:
             gap = graph.op("absolute", graph.op("sub", one, other))
             size = graph.op("add", graph.op("absolute", one), graph.op("absolute", other))
-            seen = graph.op("mul", graph.const(_SEEN), self._known(size))
+            seen = graph.op("mul", graph.const(_SEEN), self.when.noise(size))
             least = graph.op("add", graph.op("mul", graph.const(_AGREE), size), seen)
             differs = graph.op("or", differs, graph.op("gt", gap, least))
         return differs
 
     def _noise(self, m: int) -> Expr:
-        return self._known(self.graph.op("absolute", self.source.driven[m]))
-
-    def _known(self, size: Expr) -> Expr:
-        """Return how well a number of some size is known."""
-        graph, slot = self.graph, self.source.extended.slot
-        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
-        return graph.op("add", graph.op("mul", rtol, size), atol)
+        return self.when.noise(self.graph.op("absolute", self.source.driven[m]))

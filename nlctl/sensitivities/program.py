@@ -120,7 +120,7 @@ def with_its_derivatives(
     saltation = Saltation(source=source, sides=sides, places=places, seeds=seeds)
     ends = MemoryEnds(
         source=source, sides=sides, places=places, seeds=seeds, turns=saltation.turns,
-        returning=saltation.returning,
+        when=saltation.when,
     )  # fmt: skip
     maker = _Maker(
         source=source, sides=sides, places=places, seeds=seeds, observed=kept,

@@ -45,14 +45,14 @@ class Returning:
         return [graph.op("select", self._arrived(i), fallen, one) for i in lines]
 
     @property
-    def _rounding(self) -> Expr:
+    def rounding(self) -> Expr:
         """How close break points of t are that are passed at once."""
         return self.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
 
     @cached_property
     def when(self) -> When:
         """How the time moves at which jumps leave delays."""
-        return when_of(self.graph, self.causes, self.places.by, self._rounding)
+        return when_of(self.graph, self.causes, self.places.by, self.rounding)
 
     @property
     def arrives(self) -> Expr | None:

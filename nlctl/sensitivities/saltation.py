@@ -14,15 +14,13 @@ both by name only).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
-from ..expressions.dependence import reads
 from ..expressions.graph import Expr, Graph, needed
-from .branches import bounded
-from .causes import Cause, When, when_of
 from .directions import Direction, SomeRows, Taken, rows_replaced
+from .happenings import Happenings
 from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSide, KeptSides
@@ -55,7 +53,7 @@ class Saltation:
         sent = self._sent(self._seen(arriving, before), self._seen(source.single_arriving, behind))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
-        when = self._when_left(reduce(partial(graph.op, "or"), [jumps, *sent, *switches]))
+        when = self.when.left(reduce(partial(graph.op, "or"), [jumps, *sent, *switches]))
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
@@ -108,17 +106,12 @@ class Saltation:
         """Return numbers as they are behind all break points of t that are passed at once."""
         # Only what is of t alone: what states have just crossed could be as near.
         graph, t = self.source.graph, self.source.graph.leaf("t", 0, None)
-        behind = graph.op("add", t, self._rounding)
+        behind = graph.op("add", t, self.returning.rounding)
         timed = [side for side in self.sides.sides if side.timed]
         nodes = [e for s in timed for e in (s.node, s.here.now, s.before.now) if e is not None]
         later = dict(zip(nodes, replaced_parts(graph, nodes, {t: behind}), strict=True))
         exprs = replaced_parts(graph, [e for e, _ in rows], later)
         return [(e, size) for e, (_, size) in zip(exprs, rows, strict=True)]
-
-    @property
-    def _rounding(self) -> Expr:
-        """How close break points of t are that are passed at once."""
-        return self.source.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
 
     def at_reset(
         self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
@@ -139,7 +132,7 @@ class Saltation:
         atol = graph.leaf("p", source.extended.slot("atol").offset, None)
         unseen = graph.op("mul", graph.const(_UNSEEN), atol)
         sent = self._sent(self._seen(earlier, before), later, unseen)
-        when, together = self._when_reset(guards)
+        when, together = self.when.reset(guards)
         broken, after = graph.op("or", when.grazes, together), []
         for j, move in enumerate(when.moves):
             after += self._jumped(j, rows, before, behind, move, broken)
@@ -212,6 +205,14 @@ class Saltation:
         return self._first(self.places.jumped, never if self.places.lines else moves)
 
     @cached_property
+    def when(self) -> Happenings:
+        """What may happen at a time that moves."""
+        return Happenings(
+            source=self.source, sides=self.sides, places=self.places, seeds=self.seeds,
+            returning=self.returning,
+        )  # fmt: skip
+
+    @cached_property
     def returning(self) -> Returning:
         """Jumps that come back through delays."""
         return Returning(source=self.source, places=self.places, seeds=self.seeds)
@@ -227,10 +228,10 @@ class Saltation:
             for k in range(0 if side.timed else side.rows):
                 level, extent = (graph.item(e, k) for e in (side.here.level, side.here.extent))
                 yes = self._jumps_at(side)
-                rate, cause = self._met(yes, level, extent, self.source.flow)
+                rate, cause = self.when.met(yes, level, extent, self.source.flow)
                 if rate is None:
                     continue
-                noise = self._noise(extent)
+                noise = self.when.noise(extent)
                 still = graph.op("mul", graph.const(_STILL), graph.op("mul", noise, noise))
                 apart = graph.op("sub", still, graph.op("mul", level, rate))
                 near = graph.op("le", graph.op("absolute", level), noise)
@@ -445,99 +446,6 @@ class Saltation:
         graph = self.source.graph
         earlier, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
         return graph.op("select", happens, graph.op("minimum", earlier, now), earlier)
-
-    # -- when ------------------------------------------------------------------------------------
-
-    def _when_left(self, jumps: Expr) -> When:
-        """Return how the time moves at which sides have been left; a clock's does not."""
-        graph = self.source.graph
-        free, causes = graph.op("and", self._alone, jumps), []
-        for side in self.sides.sides:
-            for k in range(side.rows):
-                kept, now, level, extent = (
-                    graph.item(e, k)
-                    for e in (side.kept, side.before.now, side.before.level, side.before.extent)
-                )
-                # what a jump that leaves a delay has taken across has not been met at a rate
-                (now,) = self.returning.earlier([now])
-                left = graph.op("and", graph.op("ne", kept, now), free)
-                rate, cause = self._met(left, level, extent, self.sides.flow_before)
-                causes += [cause] if rate is not None else []
-        return when_of(graph, causes, self.places.by, self._rounding)
-
-    @property
-    def _alone(self) -> Expr:
-        """Whether neither a clock nor a block has made something jump right now."""
-        graph = self.source.graph
-        last = graph.leaf("x", self.places.last, None)
-        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
-        return graph.op("gt", ago, graph.op("mul", graph.const(2.0), self._rounding))
-
-    def _when_reset(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
-        """Return how the time moves at which a block jumps, and whether two causes differ."""
-        # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
-        # or by what was sampled right now: then that says how the time moves.
-        graph, source = self.source.graph, self.source
-        earlier, fell = self._earlier(guards), graph.const(False)
-        for guard in earlier:
-            sampled = reads([guard], "x", source.program.sampled)
-            fallen = graph.op("lt", guard, graph.const(0.0))
-            fell = graph.op("or", fell, graph.op("and", self._alone, fallen) if sampled else fallen)
-        by_itself, by_jumps = self._when_fallen(earlier), self._when_left(graph.const(True))
-        arrived = self.returning.arrives
-        by_jumps = (
-            by_jumps
-            if arrived is None
-            else self.returning.when.unless(graph.op("not", arrived), by_jumps, graph)
-        )
-        left = graph.op("lt", self.sides.margin, graph.const(0.0))
-        together = graph.op("select", fell, left, by_jumps.apart)
-        return by_jumps.unless(fell, by_itself, graph), together
-
-    def _when_fallen(self, guards: Sequence[Expr]) -> When:
-        """Return how the time moves at which a guard has fallen: the nearest to 0."""
-        graph = self.source.graph
-        far = nearest = graph.const(_FAR)
-        yes, fallen_guards = graph.const(True), []
-        for guard in guards:
-            guard = bounded(graph, guard)
-            size = graph.op("absolute", guard)
-            rate, cause = self._met(yes, guard, size, self.sides.flow_before)
-            if rate is not None:
-                fallen = graph.op("lt", guard, graph.const(0.0))
-                ago = graph.op("absolute", graph.op("div", guard, rate))
-                ago = graph.op("select", fallen, ago, far)
-                fallen_guards.append((ago, cause))
-                nearest = graph.op("minimum", nearest, ago)
-        causes = [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
-        return when_of(graph, causes, self.places.by, self._rounding)
-
-    def _met(
-        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]
-    ) -> tuple[Expr | None, Cause]:
-        """Return the rate of a level, None where it stands still, and what it is the cause of."""
-        graph, source = self.source.graph, self.source
-        forward = source.time(flow)
-        (rate,) = self.source.slopes([level], forward)
-        if rate is None:
-            return None, Cause(met=met, moves=[], grazes=graph.const(False))
-        (bend,) = self.source.slopes([rate], source.time(flow, delays_move=False))
-        noise = self._noise(extent)
-        bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
-        least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)
-        grazes = graph.op("le", graph.op("mul", rate, rate), least)
-        moves = []
-        for seed in self.seeds:
-            (change,) = self.change(level, seed)
-            zero = graph.const(0.0)
-            moves.append(graph.op("neg", graph.op("div", change, rate)) if change else zero)
-        return rate, Cause(met=met, moves=moves, grazes=grazes)
-
-    def _noise(self, extent: Expr) -> Expr:
-        """Return how well a number of some size is known."""
-        graph, slot = self.source.graph, self.source.extended.slot
-        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
-        return graph.op("add", graph.op("mul", rtol, extent), atol)
 
 
 def _sum(graph: Graph, one: Taken, other: Taken) -> Taken:
