@@ -167,6 +167,7 @@ class StatePlaces:
     lines: int = 0  # number of delayed signals whose jumps come back
     turns: bool = False  # whether memories behind these reverse
     driven: int = 0  # number of memories that are driven
+    samples: int = 0  # number of samples that drive memories, and of their derivatives
     delays: tuple[list[bool], ...] = ()  # by quantity: whether it is the delay of each of these
 
     def derivative(self, j: int) -> int:
@@ -205,4 +206,7 @@ class StatePlaces:
     arrived = property(
         lambda self: self.brought + self.turns * self.by * self.lines if self.lines else self.number
     )
-    size = property(lambda self: self.arrived + self.lines)  # number of all states
+    # when a clock last ticked, and the samples before that, with their derivatives
+    ticked = property(lambda self: self.arrived + self.lines)
+    earlier = property(lambda self: self.ticked + (self.samples > 0))
+    size = property(lambda self: self.earlier + self.samples)  # number of all states

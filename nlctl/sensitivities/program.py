@@ -102,9 +102,10 @@ def with_its_derivatives(
 
     returns = has_constant_delays(compiled)
     sides = sides_with(Sent.RATES if rated else Sent.JUMPS if returns else Sent.DERIVATIVES)
+    switches = returns and sides.source.switches_by_delays
     if sides.source.drives_by_delays:
         sides = sides_with(Sent.TURNS)
-    elif returns and not rated and sides.source.switches_by_delays:
+    elif switches and not rated:
         sides = sides_with(Sent.RATES)
     elif returns and not (rated or sides.watches or compiled.program.guards):
         sides = sides_with(Sent.DERIVATIVES)  # nothing jumps
@@ -113,6 +114,7 @@ def with_its_derivatives(
     places = StatePlaces(
         states=n, by=by, branches=sides.rows, lines=extended_program.lines if sent else 0,
         turns=sent >= Sent.TURNS, driven=len(sides.source.driven),
+        samples=len(sides.source.program.sampled) * (1 + by) if sides.source.driven else 0,
     )  # fmt: skip
     places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
@@ -230,7 +232,12 @@ class _Maker:
             switching=source.behind,
             guards=tuple(guards),
             jumping=tuple(jumping),
-            sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
+            sampled=(
+                *before.sampled,
+                *sampled,
+                *([places.last] if before.sampled else []),
+                *(range(places.ticked, places.size) if places.samples else []),
+            ),
         )
         program.__dict__["meetings"] = before.meetings
         return program
@@ -345,7 +352,16 @@ class _Maker:
         for row, array in self.source.equations.results[name]:
             for j in range(self.places.by):
                 samples += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
-        samples += self._rows(count * (1 + self.places.by), [(graph.leaf("t", 0, None), 1)])
+        now, behind = graph.leaf("t", 0, None), count * (1 + self.places.by)
+        samples += self._rows(behind, [(now, 1)])
+        if not self.places.samples:
+            return samples
+        taken = [(row, array.size) for row, array in samples[:-1]]
+        before = self.saltation.turns.sampled
+        samples += self._rows(behind + 1, [(now, 1)])
+        for row, size in taken:
+            earlier = [(graph.leaf("x", before[row + k], None), 1) for k in range(size)]
+            samples += self._rows(behind + 2 + row, earlier)
         return samples
 
 

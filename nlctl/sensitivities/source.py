@@ -219,6 +219,7 @@ class EquationParts:
         """Whether what leaves delays drives a memory, or the rate of what does."""
         if not self._reads_delays(list(self.driven.values())):
             return False
+        self._check_samples()
         nodes = self.extended.schedule.nodes
         specs = [
             nodes[line.block or 0].system.current_spec for line in self.extended.schedule.lines
@@ -239,7 +240,46 @@ class EquationParts:
     def switches_by_delays(self) -> bool:
         """Whether what leaves delays, or its size, says when something jumps."""
         arguments = [self.graph.number(a) for jump in self.jumps for a in jump.args]
-        return self._reads_delays([*arguments, *self.of_memories, *self.guards])
+        exprs = [*arguments, *self.of_memories, *self.guards]
+        if reads(exprs, "u", self._delayed_samples):
+            raise CompileError(
+                "when something jumps depends on samples that come through a delay: when these "
+                "jump there is not known; put a lag in between (nlctl.Lag), or take differences "
+                "of runs"
+            )
+        return self._reads_delays(exprs)
+
+    @property
+    def _delayed_samples(self) -> set[int]:
+        """The rows of the inputs that leave delays of what is made of samples at once."""
+        direct, sampled = self.extended.direct, self.program.sampled
+        lines = {i for i, e in enumerate(self.single_arriving) if reads([e], "x", sampled)}
+        for _ in range(len(direct)):
+            lines |= {i for i in range(len(direct)) if any(direct[i, k] for k in lines)}
+        return {self.inputs + i for i in lines}
+
+    def _check_samples(self) -> None:
+        """Refuse a memory that samples drive through a delay together with anything else."""
+        # Alone they move it only where they jump, and it keeps what it is moved to then.
+        for become in self.driven.values():
+            rows = self._delayed_samples
+            if not reads([become], "u", rows):
+                continue
+            delayed = [self.single_arriving[row - self.inputs] for row in rows]
+            leaves = [leaf for leaf in needed([become, *delayed]) if leaf.op == "leaf"]
+            still = {*self.program.sampled, *self.driven}
+            others = any(
+                leaf.data[0] == "t"
+                or (leaf.data[0] == "x" and not still.issuperset(rows_read(leaf)))
+                or (leaf.data[0] == "u" and not rows.issuperset(rows_read(leaf)))
+                for leaf in leaves
+            )
+            if others or len(rows) > 1:
+                raise CompileError(
+                    "a memory is driven by samples that come through a delay, and by something "
+                    "else: what it is driven to before they jump is not known; put a lag in "
+                    "between (nlctl.Lag), or take differences of runs"
+                )
 
     def _reads_delays(self, exprs: Sequence[Expr]) -> bool:
         """Return whether expressions, or their rates, are made of what leaves delays."""

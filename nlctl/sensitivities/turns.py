@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..errors import CompileError
-from ..expressions.dependence import rows_read
+from ..expressions.dependence import reads, rows_read
 from ..expressions.graph import Expr, needed
 from .causes import Cause, when_of
 from .corners import Corner, at_corner, corners_of
@@ -16,6 +16,7 @@ from .names import StatePlaces
 from .sides import KeptSides
 from .source import EquationParts
 
+_SAME = 1e-9  # of a memory: it is where it was driven to
 _FAR = 5e5  # a memory that is driven is kept at least so far away
 
 
@@ -34,6 +35,8 @@ class DrivenMemories:
         graph, become = self.source.graph, self.source.driven[m]
         derivative = self.turned(become, j) if at_turn else self._change(become, j)
         (derivative,) = self.sides.kept([derivative])
+        if at_turn:
+            derivative = self._at_tick(m, j, derivative)
         # it stays as it was where it begins to be driven
         moved = self.has_turned(m) if at_turn else self._has_moved(m)
         integrated = graph.leaf("x", self.places.derivative(j) + m, None)
@@ -61,6 +64,40 @@ class DrivenMemories:
             here, there = at_corner(source, level, corners, self.seeds)
             derivative = graph.op("select", here, there[j], derivative)
         return derivative
+
+    def _is_kept(self, m: int, before: Expr) -> Expr:
+        """Return whether a memory is where it was driven to before a clock has ticked."""
+        graph, now = self.source.graph, self.source.graph.leaf("x", m, None)
+        gap = graph.op("absolute", graph.op("sub", now, before))
+        size = graph.op("add", graph.op("absolute", now), graph.const(1.0))
+        return graph.op("le", gap, graph.op("mul", graph.const(_SAME), size))
+
+    @property
+    def sampled(self) -> list[int]:
+        """The states that are samples, then their derivatives."""
+        groups = [0, *(self.places.derivative(j) for j in range(self.places.by))]
+        return [first + i for first in groups for i in self.source.program.sampled]
+
+    def _at_tick(self, m: int, j: int, turned: Expr) -> Expr:
+        """Return the derivative of a memory that turns where what drives it is sampled."""
+        # What it was until then has been kept, unless the jump has gone further.
+        graph, places, sampled = self.source.graph, self.places, self.source.program.sampled
+        level = self.source.driven[m]
+        if not (places.samples and reads([level], "x", sampled)):
+            return turned
+        earlier = {
+            state: graph.leaf("x", places.earlier + k, None) for k, state in enumerate(self.sampled)
+        }
+        before, change = self.sides.kept(
+            self.source.with_states([level, self._change(level, j)], earlier)
+        )
+        (after,) = self.source.with_states([level], {m: before})
+        kept = graph.op("select", self._is_kept(m, before), change, self._change(after, j))
+        ticked = graph.leaf("x", places.ticked, None)
+        gap = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), ticked))
+        rounding = graph.leaf("p", self.source.extended.slot("rounding").offset, None)
+        here = graph.op("le", gap, rounding)
+        return graph.op("select", here, kept, turned)
 
     def _change(self, level: Expr, j: int) -> Expr:
         return self.source.changes([level], self.seeds[j])[0]

@@ -221,3 +221,30 @@ def test_two_corners_at_once(apart):
     (lack,) = made.missing
     assert lack.time == pytest.approx(P, abs=1e-6)
     assert "two corners" in lack.why
+
+
+@pytest.mark.parametrize("g", [0.3, 0.8])
+def test_memory_that_turns_at_a_sample(g):
+    """u = x - g x(1) from t = 1 on, x = R t: v keeps R - r, or is pushed to R - g R + r."""
+    law = ct.nlsys(
+        None, lambda t, x, u, p: [-p["g"] * u[0]], inputs=["x"], outputs=["held"],
+        params={"g": g}, name="law",
+    )  # fmt: skip
+    moving = ct.nlsys(
+        lambda t, x, u, p: [p["R"]], lambda t, x, u, p: [x[0], x[0] + u[0]], inputs=["held"],
+        outputs=["x", "u"], states=["x"], params={"R": R}, name="moving",
+    )  # fmt: skip
+    gap = nlctl.block(
+        nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3), "gap", inputs=["u"], outputs=["v"]
+    )
+    loop = nlctl.interconnect(
+        {"law": nlctl.sampled(law, 1.0), "moving": moving, "gap": gap}, outputs=["v"]
+    )
+    by = ["moving.R", "law.g", "gap.c_r", "gap.c_l"]
+    made = nlctl.sensitivity_response(loop, [0, 0.9, 1.1, 1.2], with_respect_to=by)
+    pushed = g > 0.6 / R
+    assert not made.missing
+    assert made.values[0, 2:] == pytest.approx(R - g * R + 0.3 if pushed else R - 0.3)
+    expected = [1 - g, -R, 0, -1] if pushed else [1, 0, -1, 0]
+    for k in (2, 3):
+        assert made.derivatives[0, :, k] == pytest.approx(expected, abs=1e-7)

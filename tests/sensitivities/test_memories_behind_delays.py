@@ -194,3 +194,23 @@ def test_what_is_refused():
     loop = connected(wave(), first, wire(D, ("m",)), gap(), outputs=["v"])
     with pytest.raises(CompileError, match="by what another one moves, through a delay"):
         nlctl.sensitivity_response(loop, [0, 1], with_respect_to="plant.w")
+
+
+def test_samples_through_delays_are_refused():
+    """When samples leave a delay is not known: refused where they say when something jumps."""
+    plant = wave(lambda t, x, u, p: [x[0]])
+    law = ct.nlsys(
+        None, lambda t, x, u, p: [2 * u[0]], inputs=["q"], outputs=["m"], name="law"
+    )  # fmt: skip
+    blocks = plant, nlctl.sampled(law, 0.1), wire(D, ("m",))
+    relay = nlctl.block(nlctl.Relay(on=0.2, off=-0.2), "relay", inputs=["y"], outputs=["v"])
+    with pytest.raises(CompileError, match="samples that come through a delay"):
+        nlctl.sensitivity_response(
+            connected(*blocks, relay, outputs=["v"]), [0, 1], with_respect_to="plant.w"
+        )
+    both = ct.nlsys(
+        None, lambda t, x, u, p: [u[0] + u[1]], inputs=["y", "q"], outputs=["u"], name="both"
+    )  # fmt: skip
+    loop = connected(*blocks, both, gap(inputs=["u"]), outputs=["v"])
+    with pytest.raises(CompileError, match="by samples that come through a delay"):
+        nlctl.sensitivity_response(loop, [0, 1], with_respect_to="plant.w")
