@@ -16,7 +16,7 @@ from ..expressions.conditions import conditions
 from ..expressions.dependence import reads
 from ..expressions.graph import Expr, Graph
 from .directions import Direction
-from .happenings import Happenings
+from .moving_times import TimesThatMove
 from .names import StatePlaces
 from .sides import KeptSides
 from .source import EquationParts
@@ -35,7 +35,7 @@ class MemoryEnds:
     places: StatePlaces
     seeds: Sequence[Direction]
     turns: DrivenMemories
-    when: Happenings
+    when: TimesThatMove
 
     @property
     def graph(self) -> Graph:
@@ -128,7 +128,7 @@ class MemoryEnds:
 
     @property
     def _when_cornered(self) -> list[Expr]:
-        """When each memory has first turned at two corners at once."""
+        """When each memory has first reversed at two corners at once."""
         no, apart, when = self.graph.const(False), self.turns.corners_apart, []
         for k, m in enumerate(self.source.driven):
             here = self.graph.op("and", self.turns.has_turned(m), apart.get(m, no))
@@ -152,7 +152,7 @@ class MemoryEnds:
 
     @property
     def _turned(self) -> list[Expr]:
-        """When each memory has last turned."""
+        """When each memory has last reversed."""
         graph, place = self.graph, self.places.turned
         now = graph.leaf("t", 0, None)
         return [
@@ -175,7 +175,7 @@ class MemoryEnds:
         ]  # fmt: skip
 
     def _has_just_turned(self, m: int) -> Expr:
-        """Return whether a memory is near its end since it has turned there."""
+        """Return whether a memory is near its end since it has reversed there."""
         place = self.places.turned + list(self.source.driven).index(m)
         return self._is_recent(self.graph.leaf("x", place, None))
 

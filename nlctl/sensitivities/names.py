@@ -188,11 +188,11 @@ class StatePlaces:
     at_reset = property(lambda self: self.together + 4)
     # when each memory that is driven was first touched at its end, or hardly moved
     touched = property(lambda self: self.together + 5)
-    # when it first turned at two corners at once
+    # when it first reversed at two corners at once
     cornered = property(lambda self: self.touched + self.driven)
     # where it stood before it was moved
     stood = property(lambda self: self.cornered + self.driven)
-    # when it last turned
+    # when it last reversed
     turned = property(lambda self: self.stood + self.driven)
     # number of jumps that were sent through each delay
     number = property(lambda self: self.turned + self.driven)

@@ -88,35 +88,11 @@ def with_its_derivatives(
     settings: Any,
 ) -> Differentiated:
     """Compile a diagram with its derivatives."""
-    by, n = len(quantities), compiled.system.nstates or 0
+    by = len(quantities)
     combinations = [s.combination for s in signals if s.combination is not None]
-    delays = {compiled.program.layout[line.block or 0]["delay"].offset
-              for line in compiled.schedule.lines}  # fmt: skip
-    rated = any(quantity.place in delays for quantity in quantities)
-
-    def sides_with(sent: Sent) -> KeptSides:
-        """Return what the program is made of, with what is sent through its delays."""
-        room = extended(compiled, combinations, by, sent)
-        whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
-        return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
-
-    returns = has_constant_delays(compiled)
-    sides = sides_with(Sent.RATES if rated else Sent.JUMPS if returns else Sent.DERIVATIVES)
-    switches = returns and sides.source.switches_by_delays
-    if sides.source.drives_by_delays:
-        sides = sides_with(Sent.TURNS)
-    elif switches and not rated:
-        sides = sides_with(Sent.RATES)
-    elif returns and not (rated or sides.watches or compiled.program.guards):
-        sides = sides_with(Sent.DERIVATIVES)  # nothing jumps
+    sides = _sides(compiled, combinations, quantities, p, settings)
     source, extended_program = sides.source, sides.source.extended
-    sent = extended_program.sent
-    places = StatePlaces(
-        states=n, by=by, branches=sides.rows, lines=extended_program.lines if sent else 0,
-        turns=sent >= Sent.TURNS, driven=len(sides.source.driven),
-        samples=len(sides.source.program.sampled) * (1 + by) if sides.source.driven else 0,
-    )  # fmt: skip
-    places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
+    places = _places(sides, quantities)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
     saltation = Saltation(source=source, sides=sides, places=places, seeds=seeds)
@@ -138,6 +114,49 @@ def with_its_derivatives(
         compiled=differentiated, places=places, extended=extended_program, sides=sides,
         outputs=outputs, saltation=saltation,
         touching=len(saltation.turning) + len(ends.guards),
+    )  # fmt: skip
+
+
+def _sides(
+    compiled: Compiled,
+    combinations: Sequence[Any],
+    quantities: Sequence[VariedQuantity],
+    p: np.ndarray,
+    settings: Any,
+) -> KeptSides:
+    """Return what a program is made of, with all that has to be sent through its delays."""
+    by, n = len(quantities), compiled.system.nstates or 0
+    delays = {compiled.program.layout[line.block or 0]["delay"].offset
+              for line in compiled.schedule.lines}  # fmt: skip
+    rated = any(quantity.place in delays for quantity in quantities)
+
+    def sides_with(sent: Sent) -> KeptSides:
+        room = extended(compiled, combinations, by, sent)
+        whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
+        return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
+
+    returns = has_constant_delays(compiled)
+    sides = sides_with(Sent.RATES if rated else Sent.JUMPS if returns else Sent.DERIVATIVES)
+    switches = returns and sides.source.switches_by_delays
+    if sides.source.drives_by_delays:
+        return sides_with(Sent.TURNS)
+    if switches and not rated:
+        return sides_with(Sent.RATES)
+    if returns and not (rated or sides.watches or compiled.program.guards):
+        return sides_with(Sent.DERIVATIVES)  # nothing jumps
+    return sides
+
+
+def _places(sides: KeptSides, quantities: Sequence[VariedQuantity]) -> StatePlaces:
+    """Return where a program has its states."""
+    source, extended_program = sides.source, sides.source.extended
+    sent, by = extended_program.sent, len(quantities)
+    return StatePlaces(
+        states=sum(size for _, size in source.flow), by=by, branches=sides.rows,
+        lines=extended_program.lines if sent else 0, turns=sent >= Sent.TURNS,
+        driven=len(source.driven),
+        samples=len(source.program.sampled) * (1 + by) if source.driven else 0,
+        delays=tuple(extended_program.is_delay(q.place) for q in quantities),
     )  # fmt: skip
 
 
@@ -197,41 +216,14 @@ class _Maker:
     def program(self) -> Program:
         """Return the arrays of the program."""
         source, places = self.source, self.places
-        before, n, by = source.program, places.states, places.by
-        owner = source.extended.owner
-        jumping, guards = list(before.jumping), list(before.guards)
-        turning = list(self.saltation.at_turns())
-        first = places.kept + self.sides.first_memory
-        guards[:0] = [owner + 3] * places.lines
-        for i, _, _ in before.jumping:
-            jumping += [(i, n, places.together), (i, places.grazing, places.touched)]
-            jumping += [(i, places.number, places.arrived)] if places.lines else []
-        if self.sides.watches:
-            guards.insert(0, owner)  # a reset by what has jumped says more
-            jumping.append((owner, n, places.last))
-            jumping += [(owner, places.number, places.arrived)] if places.lines else []
-        if turning:
-            jumping += [(owner + 1, m, m + 1) for m in turning]
-            jumping.append((owner + 1, first, first + len(before.memory)))
-            jumping.append((owner + 1, places.touched, places.number))
-            guards.insert(0, owner + 1)  # what else jumps then says more
-        touching = len(self.saltation.turning) + len(self.ends.guards)
-        if touching:
-            jumping.append((owner + 2, places.grazing, places.grazing + 1))
-            jumping.append((owner + 2, places.touched, places.cornered))
-            guards[:0] = [owner + 2] * touching
-        if places.lines:
-            jumping.append((owner + 3, n, places.kept))
-            jumping += [(owner + 3, first, first + len(before.memory))] if places.turns else []
-            jumping.append((owner + 3, places.together, places.grazing))
-            jumping.append((owner + 3, places.number, places.size))
+        before, by = source.program, places.by
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         program = replace(
             before,
             layout=source.extended.layout,
             switching=source.behind,
-            guards=tuple(guards),
-            jumping=tuple(jumping),
+            guards=self._guards,
+            jumping=self._jumping,
             sampled=(
                 *before.sampled,
                 *sampled,
@@ -241,6 +233,43 @@ class _Maker:
         )
         program.__dict__["meetings"] = before.meetings
         return program
+
+    @property
+    def _guards(self) -> tuple[int, ...]:
+        """Whose the guards are: what jumps by a later one says more."""
+        owner = self.source.extended.owner
+        count = len(self.saltation.turning) + len(self.ends.guards)
+        turning = [owner + 1] if self.source.driven else []
+        watching = [owner] if self.sides.watches else []
+        arriving = [owner + 3] * self.places.lines
+        ours = [*[owner + 2] * count, *turning, *watching, *arriving]
+        return (*ours, *self.source.program.guards)
+
+    @property
+    def _jumping(self) -> tuple[tuple[int, int, int], ...]:
+        """Which states jump by whose guards."""
+        places, before, owner = self.places, self.source.program, self.source.extended.owner
+        n, first = places.states, places.kept + self.sides.first_memory
+        memories = (first, first + len(before.memory))
+        sent = [(places.number, places.arrived)] if places.lines else []
+        jumping: list[tuple[int, tuple[int, int]]] = []
+        for i, _, _ in before.jumping:
+            rows = [(n, places.together), (places.grazing, places.touched), *sent]
+            jumping += [(i, row) for row in rows]
+        if self.sides.watches:
+            jumping += [(owner, row) for row in [(n, places.last), *sent]]
+        if self.source.driven:
+            turning = [(m, m + 1) for m in self.saltation.at_turns()]
+            rows = [*turning, memories, (places.touched, places.number)]
+            jumping += [(owner + 1, row) for row in rows]
+        if self.ends.guards or self.saltation.turning:
+            rows = [(places.grazing, places.grazing + 1), (places.touched, places.cornered)]
+            jumping += [(owner + 2, row) for row in rows]
+        if places.lines:
+            rows = [(n, places.kept), *([memories] if places.turns else [])]
+            rows += [(places.together, places.grazing), (places.number, places.ticked)]
+            jumping += [(owner + 3, row) for row in rows]
+        return (*before.jumping, *((i, *row) for i, row in jumping))
 
     def equations(self) -> Equations:
         """Return what the program computes."""

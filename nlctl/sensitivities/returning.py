@@ -188,8 +188,15 @@ class Returning:
         """Return what leaves line `i` of a group: -1 has the signals, then `Extended.line`."""
         return self.graph.leaf("u", self.source.inputs + self.source.extended.line(group, i), None)
 
-    def _arrived(self, i: int) -> Expr:
-        """Return whether a jump leaves a line now."""
+    def _arrived(self, i: int, more_than: float = _ANOTHER) -> Expr:
+        """Return whether a jump leaves a line now, or more than one."""
         graph, places = self.graph, self.places
         apart = graph.op("sub", self._leaving(places.by, i), self._state(places.arrived + i))
-        return graph.op("gt", graph.op("absolute", apart), graph.const(_ANOTHER))
+        return graph.op("gt", graph.op("absolute", apart), graph.const(more_than))
+
+    @property
+    def several(self) -> Expr:
+        """Whether more than one jump leaves a line now, of which only the last is known."""
+        graph, lines = self.graph, range(self.places.lines)
+        several = [self._arrived(i, 1.0 + _ANOTHER) for i in lines]
+        return reduce(lambda a, b: graph.op("or", a, b), several, graph.const(False))

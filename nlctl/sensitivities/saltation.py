@@ -20,7 +20,7 @@ from functools import cached_property, partial, reduce
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
 from .directions import Direction, SomeRows, Taken, rows_replaced
-from .happenings import Happenings
+from .moving_times import TimesThatMove
 from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSide, KeptSides
@@ -178,7 +178,8 @@ class Saltation:
             rows += [(graph.op("select", when.apart, graph.const(0.0), s), n) for s, n in states]
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
-        rows.append((self._first(self.places.together, when.apart), 1))
+        together = graph.op("or", when.apart, returning.several)
+        rows.append((self._first(self.places.together, together), 1))
         arriving = self._earlier(source.single_arriving)
         sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
         sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
@@ -205,9 +206,9 @@ class Saltation:
         return self._first(self.places.jumped, never if self.places.lines else moves)
 
     @cached_property
-    def when(self) -> Happenings:
+    def when(self) -> TimesThatMove:
         """What may happen at a time that moves."""
-        return Happenings(
+        return TimesThatMove(
             source=self.source, sides=self.sides, places=self.places, seeds=self.seeds,
             returning=self.returning,
         )  # fmt: skip

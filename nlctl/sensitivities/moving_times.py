@@ -19,7 +19,7 @@ _FAR = 1e300
 
 
 @dataclass(frozen=True, kw_only=True)
-class Happenings:
+class TimesThatMove:
     """What may happen at a time that moves."""
 
     source: EquationParts
