@@ -263,10 +263,6 @@ class Saltation:
             source=self.source, sides=self.sides, places=self.places, seeds=self.seeds
         )  # fmt: skip
 
-    def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
-        """Return the derivative of an expression in a direction."""
-        return self.source.slopes([level], seed)
-
     def at_turns(self) -> dict[int, Expr]:
         """Return what derivatives of memories become where these turn, by their states."""
         places, driven = self.places, self.source.driven
