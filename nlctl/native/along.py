@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..expressions.dependence import structure
+from .equations.blocks import Equations
 from .integrate.methods.lu import Elimination, elimination
 from .integrate.state import DIRECTIONS
 from .jacobians import along
@@ -26,6 +27,7 @@ from .reading import Reading
 class Along:
     """Machine code of derivatives, for all parameters that it holds for, and some of these."""
 
+    equations: Equations  # of what they are the derivatives
     lowered: Lowered
     prepare: Any
     point: object  # ``point(t, x, u, c)``, once for each point
@@ -44,9 +46,12 @@ class Along:
 
 def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     """Return the derivatives for a parameter vector, made when they are first needed."""
-    # None if there are none: an equation was differentiated for an integer parameter that has
-    # another value now.  Opaque functions have differences in them.
-    made = reading.cache.found(Along, lambda each: True, lambda: _made(reading))
+    # Equations, and cuts of loops, are those of its integers. None if there are none: a program of
+    # derivatives was itself differentiated for an integer that has another value now. Opaque
+    # functions have differences in them.
+    made = _made_with(reading, p)
+    if not made.lowered.holds_for(p) and reading.apart is not None:
+        made = _made_with(reading, p)  # what steers derivatives alone is known now
     if not made.lowered.holds_for(p):
         return None
     c = np.zeros((made.lowered.size, DIRECTIONS))
@@ -54,13 +59,20 @@ def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     return replace(made, c=c)
 
 
-def _made(reading: Reading) -> Along:
-    equations = reading.equations
+def _made_with(reading: Reading, p: np.ndarray) -> Along:
+    read = reading.equations_with(p)
+    return reading.cache.found(
+        Along, lambda each: each.equations is read, lambda: _made(reading, read)
+    )
+
+
+def _made(reading: Reading, equations: Equations) -> Along:
     n, m = reading.system.nstates or 0, reading.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
     lowered = lower_along(reading.schedule, reading.program, equations, rows, DIRECTIONS)
     prepare, point, function = lowered_code(lowered)
     order = elimination(structure(equations.pieces("dx"), "x", n))
     return Along(
-        lowered=lowered, prepare=prepare, point=point, function=function, elimination=order
-    )
+        equations=equations, lowered=lowered, prepare=prepare, point=point, function=function,
+        elimination=order,
+    )  # fmt: skip

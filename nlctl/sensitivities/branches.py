@@ -11,8 +11,8 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..expressions.conditions import JUMPING, conditions
-from ..expressions.graph import Expr, Graph
+from ..expressions.conditions import JUMPING, conditions, number_rooted
+from ..expressions.graph import Expr, Graph, needed
 
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
 _WHOLE = ("floor", "ceil", "trunc", "rint")
@@ -35,6 +35,23 @@ class Branch:
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:
     """Return the operations that may jump in expressions, parts first."""
     return [node for node in conditions(exprs) if node.op in _JUMPS]
+
+
+def by_comparisons(graph: Graph, exprs: Sequence[Expr]) -> list[Expr]:
+    """Return expressions with comparisons in the places of `abs`, `max` and `min`."""
+    new: dict[Expr, Expr] = {}
+    for node in needed(exprs):
+        args = [new.get(arg, arg) for arg in node.args]
+        root = number_rooted(node)
+        if node.varies and (node.op in ("maximum", "minimum", "absolute") or root is not None):
+            one = graph.number(args[0] if root is None else new.get(root, root))
+            both = node.op in ("maximum", "minimum")
+            other = graph.number(args[1]) if both else graph.op("neg", one)
+            order = graph.op("lt" if node.op == "minimum" else "gt", one, other)
+            new[node] = graph.op("select", order, one, other)
+        elif tuple(args) != node.args:
+            new[node] = graph.like(node, *args)
+    return [new.get(e, e) for e in exprs]
 
 
 def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch:

@@ -20,6 +20,18 @@ class When:
     apart: Expr  # whether two conditions say different things
     happens: Expr  # whether anything happens at a time that moves
 
+    def unless(self, condition: Expr, other: When, graph: Graph) -> When:
+        """Return this, or another if a condition holds."""
+
+        def either(one: Expr, two: Expr) -> Expr:
+            return graph.op("select", condition, two, one)
+
+        return When(
+            moves=[either(*pair) for pair in zip(self.moves, other.moves, strict=True)],
+            grazes=either(self.grazes, other.grazes), apart=either(self.apart, other.apart),
+            happens=either(self.happens, other.happens),
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:

@@ -55,23 +55,23 @@ def taken(graph: Graph, pieces: Sequence[SomeRows]) -> Taken:
 
 
 def from_time(
-    graph: Graph, time: Expr | None, inputs: int, first: int, lines: range, rates: int | None
+    graph: Graph, time: Expr | None, lines: range, rate_row: Callable[[int], int | None]
 ) -> Direction:
     """Return where time and inputs go while time goes by `time`, by 1 if that is None."""
-    # The rates of delayed signals, the rows `lines`, are the rows from `rates` on, if anywhere.
+    # What has no row of rates stands still, but for the rows `lines`, which are delayed signals.
 
     def of_time(*_: object) -> Expr:
         return graph.const(1.0) if time is None else time
 
     def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
-        if start in lines and rates is None:
+        row = rate_row(start)
+        if row is None and start in lines:
             raise CompileError(
-                "when something jumps depends on a delayed signal, whose rate is not kept: put a "
-                "lag behind the delay (nlctl.Lag), or take differences of runs"
+                "when something jumps depends on a signal whose delay varies, of which rates are "
+                "not kept: put a lag behind the delay (nlctl.Lag), or take differences of runs"
             )
-        if start >= inputs and start not in lines:
+        if row is None:
             return None
-        row = rates + start - lines.start if rates is not None and start in lines else first + start
         where = ("u", row, step)
         rate = graph.node("leaf", data=where, size=size, varies=True)
         return rate if time is None else graph.op("mul", rate, time)

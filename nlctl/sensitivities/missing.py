@@ -27,6 +27,8 @@ _KINK = "the run stays on a kink, and on either side of it if it is moved"
 _FIRST = "what jumps at the start is at a kink or jump, and on either side of it if it is moved"
 _PAIRS = 32  # of times one after the other, at which a run may be on a kink
 _START = "the run starts on a condition, and on either side of it if it is moved"
+_TOUCHED = "a memory is touched at its end and no further, and is moved, or not, by what moves that"
+_CORNERED = "a memory turns where its input has two corners, each at another time if it is moved"
 _MARKS = (("together", _TOGETHER), ("at_reset", _TOGETHER), ("grazing", _GRAZING))
 
 
@@ -73,6 +75,11 @@ class _Run:
             for name, why in _MARKS
             if last[getattr(places, name)] <= end
         ]
+        for place, why in ((places.touched, _TOUCHED), (places.cornered, _CORNERED)):
+            for k, m in enumerate(self.differentiated.sides.source.driven):
+                if last[place + k] <= end:
+                    lack = self._lack(float(last[place + k]), why)
+                    lacks.append(replace(lack, where=f"memory of '{self._owner(m)}'"))
         if last[places.jumped] <= end and self.differentiated.extended.lines:
             lacks.append(self._lack(float(last[places.jumped]) + self._shortest(p), _RETURNS))
         together = self._resets_together()
@@ -182,6 +189,11 @@ class _Run:
         where = ", ".join(f"{which} of '{block}'" for block, which in happened if block)
         return NoDerivative(time=time, where=where, why=why, with_respect_to=self.names)
 
+    def _owner(self, m: int) -> str:
+        """Return the block that a state belongs to."""
+        nodes = self.compiled.schedule.nodes
+        return next(n.path for n in reversed(nodes) if n.size and n.state_offset <= m)
+
     def _shortest(self, p: np.ndarray) -> float:
         """Return the shortest delay in s, 0 if one varies."""
         extended, delays = self.differentiated.extended, []
@@ -200,8 +212,8 @@ class _Run:
         ordered = source.ordered
         labels = [*(labels[k] for k in ordered), *labels[len(ordered) :]]
         first = self.compiled.program.switching + conditions.rows
-        watching = len(self.differentiated.saltation.turning) + bool(source.driven)
-        watching += self.differentiated.sides.watches
+        watching = self.differentiated.touching + bool(source.driven)
+        watching += self.differentiated.sides.watches + self.differentiated.places.lines
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):
             if first <= row < first + watching:

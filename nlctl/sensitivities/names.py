@@ -168,6 +168,9 @@ class StatePlaces:
     by: int  # number of quantities
     branches: int = 0  # number of sides of jumps that are kept
     lines: int = 0  # number of delayed signals whose jumps come back
+    turns: bool = False  # whether memories behind these reverse
+    driven: int = 0  # number of memories that are driven
+    samples: int = 0  # number of samples that drive memories, and of their derivatives
     delays: tuple[list[bool], ...] = ()  # by quantity: whether it is the delay of each of these
 
     def derivative(self, j: int) -> int:
@@ -186,12 +189,27 @@ class StatePlaces:
     last = property(lambda self: self.together + 3)
     # when a guard and a condition were first met at one instant
     at_reset = property(lambda self: self.together + 4)
-    # number of jumps that were sent through delays
-    number = property(lambda self: self.together + 5)
+    # when each memory that is driven was first touched at its end, or hardly moved
+    touched = property(lambda self: self.together + 5)
+    # when it first reversed at two corners at once
+    cornered = property(lambda self: self.touched + self.driven)
+    # where it stood before it was moved
+    stood = property(lambda self: self.cornered + self.driven)
+    # when it last reversed
+    turned = property(lambda self: self.stood + self.driven)
+    # number of jumps that were sent through each delay
+    number = property(lambda self: self.turned + self.driven)
     # how far each delayed signal has jumped last
-    height = property(lambda self: self.number + 1)
+    height = property(lambda self: self.number + self.lines)
     # how the time of that moves, by each quantity
     moved = property(lambda self: self.height + self.lines)
+    # the derivatives of all delayed signals right before that, at a time that moves
+    brought = property(lambda self: self.moved + self.by)
     # how many of these jumps have left each line
-    arrived = property(lambda self: self.moved + self.by if self.lines else self.number)
-    size = property(lambda self: self.arrived + self.lines)  # number of all states
+    arrived = property(
+        lambda self: self.brought + self.turns * self.by * self.lines if self.lines else self.number
+    )
+    # when a clock last ticked, and the samples before that, with their derivatives
+    ticked = property(lambda self: self.arrived + self.lines)
+    earlier = property(lambda self: self.ticked + (self.samples > 0))
+    size = property(lambda self: self.earlier + self.samples)  # number of all states

@@ -21,9 +21,10 @@ from ..native.equations.blocks import Equations
 from ..native.equations.located import Located
 from ..native.settings import Settings
 from .directions import Direction, SomeRows
+from .ends import MemoryEnds
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
-from .schedule import Extended, extended, has_constant_delays, with_derivatives
+from .schedule import Extended, Sent, extended, has_constant_delays, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
@@ -43,6 +44,7 @@ class Differentiated:
     sides: KeptSides
     outputs: int  # number of the signals that are outputs
     saltation: Saltation
+    touching: int  # number of what is watched for turning away where it is touched
     # derivatives of levels that a run was on, by the number of the quantity
     changes: dict[tuple[Expr, int], Expr | None] = field(default_factory=dict)
 
@@ -86,31 +88,21 @@ def with_its_derivatives(
     settings: Any,
 ) -> Differentiated:
     """Compile a diagram with its derivatives."""
-    by, n = len(quantities), compiled.system.nstates or 0
+    by = len(quantities)
     combinations = [s.combination for s in signals if s.combination is not None]
-    delays = {compiled.program.layout[line.block or 0]["delay"].offset
-              for line in compiled.schedule.lines}  # fmt: skip
-    rated = any(quantity.place in delays for quantity in quantities)
-
-    def sides_with(returns: bool) -> KeptSides:
-        """Return what the program is made of, with or without jumps that come back."""
-        room = extended(compiled, combinations, by, returns=returns, rated=rated)
-        whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
-        return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
-
-    returns = has_constant_delays(compiled)
-    sides = sides_with(returns)
-    if returns and not (rated or sides.watches or compiled.program.guards):
-        sides = sides_with(returns=False)  # nothing jumps
+    sides = _sides(compiled, combinations, quantities, p, settings)
     source, extended_program = sides.source, sides.source.extended
-    lines = extended_program.lines if extended_program.returns else 0
-    places = StatePlaces(states=n, by=by, branches=sides.rows, lines=lines)
-    places = replace(places, delays=tuple(extended_program.is_delay(q.place) for q in quantities))
+    places = _places(sides, quantities)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.driven]
+    saltation = Saltation(source=source, sides=sides, places=places, seeds=seeds)
+    ends = MemoryEnds(
+        source=source, sides=sides, places=places, seeds=seeds, turns=saltation.turns,
+        when=saltation.when,
+    )  # fmt: skip
     maker = _Maker(
         source=source, sides=sides, places=places, seeds=seeds, observed=kept,
-        saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
+        saltation=saltation, ends=ends,
     )  # fmt: skip
     outputs = len(combinations) + len(kept)
     schedule = with_derivatives(compiled, extended_program, places.size, outputs * (1 + by), by)
@@ -120,7 +112,51 @@ def with_its_derivatives(
     differentiated.__dict__["equations"] = maker.equations()
     return Differentiated(
         compiled=differentiated, places=places, extended=extended_program, sides=sides,
-        outputs=outputs, saltation=maker.saltation,
+        outputs=outputs, saltation=saltation,
+        touching=len(saltation.turning) + len(ends.guards),
+    )  # fmt: skip
+
+
+def _sides(
+    compiled: Compiled,
+    combinations: Sequence[Any],
+    quantities: Sequence[VariedQuantity],
+    p: np.ndarray,
+    settings: Any,
+) -> KeptSides:
+    """Return what a program is made of, with all that has to be sent through its delays."""
+    by, n = len(quantities), compiled.system.nstates or 0
+    delays = {compiled.program.layout[line.block or 0]["delay"].offset
+              for line in compiled.schedule.lines}  # fmt: skip
+    rated = any(quantity.place in delays for quantity in quantities)
+
+    def sides_with(sent: Sent) -> KeptSides:
+        room = extended(compiled, combinations, by, sent)
+        whole = parameters_with(room, quantities, p, np.ones(by), settings, (0.0, 1.0))
+        return sides_of(equation_parts(compiled, room, whole), n * (1 + by))
+
+    returns = has_constant_delays(compiled)
+    sides = sides_with(Sent.RATES if rated else Sent.JUMPS if returns else Sent.DERIVATIVES)
+    switches = returns and sides.source.switches_by_delays
+    if sides.source.drives_by_delays:
+        return sides_with(Sent.TURNS)
+    if switches and not rated:
+        return sides_with(Sent.RATES)
+    if returns and not (rated or sides.watches or compiled.program.guards):
+        return sides_with(Sent.DERIVATIVES)  # nothing jumps
+    return sides
+
+
+def _places(sides: KeptSides, quantities: Sequence[VariedQuantity]) -> StatePlaces:
+    """Return where a program has its states."""
+    source, extended_program = sides.source, sides.source.extended
+    sent, by = extended_program.sent, len(quantities)
+    return StatePlaces(
+        states=sum(size for _, size in source.flow), by=by, branches=sides.rows,
+        lines=extended_program.lines if sent else 0, turns=sent >= Sent.TURNS,
+        driven=len(source.driven),
+        samples=len(source.program.sampled) * (1 + by) if source.driven else 0,
+        delays=tuple(extended_program.is_delay(q.place) for q in quantities),
     )  # fmt: skip
 
 
@@ -174,43 +210,66 @@ class _Maker:
     places: StatePlaces
     seeds: Sequence[Direction]
     saltation: Saltation
+    ends: MemoryEnds
     observed: Sequence[int]
 
     def program(self) -> Program:
         """Return the arrays of the program."""
         source, places = self.source, self.places
-        before, n, by = source.program, places.states, places.by
-        owner = source.extended.owner
-        jumping, guards = list(before.jumping), list(before.guards)
-        turning = list(self.saltation.at_turns())
-        first = places.kept + self.sides.first_memory
-        for i, _, _ in before.jumping:
-            jumping += [(i, n, places.together), (i, places.grazing, places.arrived)]
-        if self.sides.watches:
-            guards.insert(0, owner)  # a reset by what has jumped says more
-            jumping.append((owner, n, places.last))
-            jumping += [(owner, places.number, places.arrived)] if places.lines else []
-        if turning:
-            jumping += [(owner + 1, m, m + 1) for m in turning]
-            jumping.append((owner + 1, first, first + len(before.memory)))
-            guards.insert(0, owner + 1)  # what else jumps then says more
-        if self.saltation.turning:
-            jumping.append((owner + 2, places.grazing, places.grazing + 1))
-            guards[:0] = [owner + 2] * len(self.saltation.turning)
-        if places.lines:
-            jumping += [(owner + 3, n, places.kept), (owner + 3, places.together, places.grazing)]
-            jumping.append((owner + 3, places.number, places.size))
+        before, by = source.program, places.by
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         program = replace(
             before,
             layout=source.extended.layout,
             switching=source.behind,
-            guards=(*guards, *[owner + 3] * places.lines),
-            jumping=tuple(jumping),
-            sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
+            guards=self._guards,
+            jumping=self._jumping,
+            sampled=(
+                *before.sampled,
+                *sampled,
+                *([places.last] if before.sampled else []),
+                *(range(places.ticked, places.size) if places.samples else []),
+            ),
         )
         program.__dict__["meetings"] = before.meetings
         return program
+
+    @property
+    def _guards(self) -> tuple[int, ...]:
+        """Whose the guards are: what jumps by a later one says more."""
+        owner = self.source.extended.owner
+        count = len(self.saltation.turning) + len(self.ends.guards)
+        turning = [owner + 1] if self.source.driven else []
+        watching = [owner] if self.sides.watches else []
+        arriving = [owner + 3] * self.places.lines
+        ours = [*[owner + 2] * count, *turning, *watching, *arriving]
+        return (*ours, *self.source.program.guards)
+
+    @property
+    def _jumping(self) -> tuple[tuple[int, int, int], ...]:
+        """Which states jump by whose guards."""
+        places, before, owner = self.places, self.source.program, self.source.extended.owner
+        n, first = places.states, places.kept + self.sides.first_memory
+        memories = (first, first + len(before.memory))
+        sent = [(places.number, places.arrived)] if places.lines else []
+        jumping: list[tuple[int, tuple[int, int]]] = []
+        for i, _, _ in before.jumping:
+            rows = [(n, places.together), (places.grazing, places.touched), *sent]
+            jumping += [(i, row) for row in rows]
+        if self.sides.watches:
+            jumping += [(owner, row) for row in [(n, places.last), *sent]]
+        if self.source.driven:
+            turning = [(m, m + 1) for m in self.saltation.at_turns()]
+            rows = [*turning, memories, (places.touched, places.number)]
+            jumping += [(owner + 1, row) for row in rows]
+        if self.ends.guards or self.saltation.turning:
+            rows = [(places.grazing, places.grazing + 1), (places.touched, places.cornered)]
+            jumping += [(owner + 2, row) for row in rows]
+        if places.lines:
+            rows = [(n, places.kept), *([memories] if places.turns else [])]
+            rows += [(places.together, places.grazing), (places.number, places.ticked)]
+            jumping += [(owner + 3, row) for row in rows]
+        return (*before.jumping, *((i, *row) for i, row in jumping))
 
     def equations(self) -> Equations:
         """Return what the program computes."""
@@ -287,15 +346,14 @@ class _Maker:
             for row, array in source.equations.results["g"]
             if source.program.switching <= row < first and array.size
         ]
-        rows = [apart for apart, _ in self.saltation.turning]
+        rows = [*(apart for apart, _ in self.saltation.turning), *self.ends.guards]
         rows += [self.sides.driven] if source.driven else []
         rows += [self.sides.margin] if self.sides.watches else []
-        rows += source.guards
-        rows += self.saltation.returning.guards
+        rows += [*self.saltation.returning.guards, *source.guards]
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
-        source = self.source
+        source, places = self.source, self.places
         resets = source.equations.results.get("reset", [])
         pieces = [p for _, array in resets for p in array.pieces()]
         guards: dict[int, list[Expr]] = {}
@@ -309,9 +367,11 @@ class _Maker:
         if reversed_levels:
             pieces += [(e, 1) for e in reversed_levels.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
-        if self.saltation.turning:
+            pieces += [(e, 1) for e in self.ends.at_turns]
+        if self.saltation.turning or self.ends.guards:
             pieces.append((self.saltation.at_touch(), 1))
-        if self.places.lines:
+            pieces += [(e, 1) for e in self.ends.when_touched]
+        if places.lines:
             pieces += self.saltation.at_arrival()
         return self._rows(0, pieces)
 
@@ -321,7 +381,16 @@ class _Maker:
         for row, array in self.source.equations.results[name]:
             for j in range(self.places.by):
                 samples += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
-        samples += self._rows(count * (1 + self.places.by), [(graph.leaf("t", 0, None), 1)])
+        now, behind = graph.leaf("t", 0, None), count * (1 + self.places.by)
+        samples += self._rows(behind, [(now, 1)])
+        if not self.places.samples:
+            return samples
+        taken = [(row, array.size) for row, array in samples[:-1]]
+        before = self.saltation.turns.sampled
+        samples += self._rows(behind + 1, [(now, 1)])
+        for row, size in taken:
+            earlier = [(graph.leaf("x", before[row + k], None), 1) for k in range(size)]
+            samples += self._rows(behind + 2 + row, earlier)
         return samples
 
 

@@ -76,8 +76,9 @@ def sensitivity_response(
     SensitivityResponse
         ``response["plant.y", "law.beta"]`` over ``response.time``.  Where there is no derivative
         it is NaN from there on, and ``response.missing`` says when, where and why: a condition
-        that is met at a rate of 0 (grazing), two at one instant, a start on a condition,
-        switches without end, a jump that comes back through a delay that varies.
+        that is met at a rate of 0 (grazing), two at one instant, a start on a condition, a memory
+        that is touched at its end by a corner, switches without end, a jump that comes back through
+        a delay that varies.
 
     Raises
     ------
@@ -87,8 +88,8 @@ def sensitivity_response(
         If the diagram cannot be compiled, is in discrete time, or something in it has no
         derivative: a parameter that numbers follow from outside of the equations, one that says
         when samples are taken, a delay where one varies or has a history or where blocks are
-        sampled, an algebraic loop that jumps, a condition on a delayed signal, a memory that one
-        drives.
+        sampled, an algebraic loop that jumps, a condition or a memory behind a delay that varies or
+        has samples in it, a memory that another one moves through a delay.
     ParameterError
         If a value is refused.
     DivergedError

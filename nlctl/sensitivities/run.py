@@ -27,6 +27,7 @@ from .missing import missing
 from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
+from .schedule import Sent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +143,7 @@ def _start(
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
     start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
-    sides, rated = differentiated.sides, differentiated.extended.rated
+    sides, rated = differentiated.sides, differentiated.extended.sent >= Sent.RATES
     if not sides.rows and not differentiated.compiled.program.sampled and not rated:
         return start, {}
     arrays = _beginning(differentiated, run, u, start, p)
@@ -150,7 +151,8 @@ def _start(
         layout, lines = differentiated.extended.layout, differentiated.extended.schedule.lines
         before = [p[layout[line.block or 0]["before"].offset] for line in lines[: places.lines]]
         first = _values(differentiated, sides.source.arriving, arrays)
-        start[places.number], start[places.height : places.moved] = 1.0, before - first
+        start[places.number : places.height] = 1.0
+        start[places.height : places.moved] = before - first
     start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
     memories = [*sides.source.driven, *sides.source.catching]
     arrays["x"][memories, 0] = x0[memories]  # from where they are moved

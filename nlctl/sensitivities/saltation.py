@@ -13,16 +13,14 @@ both by name only).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
-from ..expressions.dependence import reads
 from ..expressions.graph import Expr, Graph, needed
-from .branches import bounded
-from .causes import Cause, When, when_of
 from .directions import Direction, SomeRows, Taken, rows_replaced
+from .moving_times import TimesThatMove
 from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSide, KeptSides
@@ -49,13 +47,13 @@ class Saltation:
     def at_conditions(self) -> list[SomeRows]:
         """Return what follows the states where a side has been left."""
         source, graph, places = self.source, self.source.graph, self.places
-        arriving = self.sides.earlier([e for e, _ in source.arriving])
-        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+        arriving = self.sides.earlier(source.single_arriving)
         before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
         behind = source.moving(source.flow, source.committed)
+        sent = self._sent(self._seen(arriving, before), self._seen(source.single_arriving, behind))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
-        when = self._when_left(reduce(partial(graph.op, "or"), [jumps, sent, *switches]))
+        when = self.when.left(reduce(partial(graph.op, "or"), [jumps, *sent, *switches]))
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
@@ -64,13 +62,16 @@ class Saltation:
                 if a is not b:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
                 states.append((s, size))
-            across = self._across(j, before, behind, move)
+            across = self._across(j, before, behind, move, self._driving)
             for s, size in rows_replaced(graph, states, across):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         moves = self.returning.counts(when, sent)
-        happens = [(when.apart, 1), (when.grazes, 1), (moves, 1)]
-        sent_rows = self.returning.sent(moves, arriving, source.arriving, when.moves)
+        happens = [(e, 1) for e in (when.apart, when.grazes, self._any(moves))]
+        brought = self._brought(before, when.moves)
+        sent_rows = self.returning.sent(
+            moves, arriving, source.single_arriving, when.moves, brought
+        )  # fmt: skip
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
         rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
         sent_rows = behind_all[len(rows) + 3 :]
@@ -79,40 +80,59 @@ class Saltation:
         rows.append((self._lost_in_delay(jumped[0]), 1))
         return [*rows, *sent_rows]
 
+    def _any(self, conditions: Sequence[Expr]) -> Expr:
+        """Return whether any of some conditions holds."""
+        graph = self.source.graph
+        return reduce(partial(graph.op, "or"), conditions, graph.const(False))
+
+    def _seen(self, arriving: Sequence[Expr], flow: Sequence[SomeRows]) -> list[list[Expr]]:
+        """Return what may jump of what arrives at each delay: rates, too, if memories follow it."""
+        rates = self.places.turns and self.source.changes(arriving, self.source.time(flow))
+        return [list(pair) for pair in zip(arriving, *([rates] if rates else []), strict=True)]
+
+    def _sent(
+        self,
+        earlier: Sequence[Sequence[Expr]],
+        now: Sequence[Sequence[Expr]],
+        unseen: Expr | None = None,
+    ) -> list[Expr]:
+        """Return whether what arrives at each delay jumps."""
+        pairs = [
+            zip(a, [(e, 1) for e in b], strict=True) for a, b in zip(earlier, now, strict=True)
+        ]
+        return [self._any([self._differ([pair], unseen) for pair in line]) for line in pairs]
+
     def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
         """Return numbers as they are behind all break points of t that are passed at once."""
         # Only what is of t alone: what states have just crossed could be as near.
         graph, t = self.source.graph, self.source.graph.leaf("t", 0, None)
-        behind = graph.op("add", t, self._rounding)
+        behind = graph.op("add", t, self.returning.rounding)
         timed = [side for side in self.sides.sides if side.timed]
         nodes = [e for s in timed for e in (s.node, s.here.now, s.before.now) if e is not None]
         later = dict(zip(nodes, replaced_parts(graph, nodes, {t: behind}), strict=True))
         exprs = replaced_parts(graph, [e for e, _ in rows], later)
         return [(e, size) for e, (_, size) in zip(exprs, rows, strict=True)]
 
-    @property
-    def _rounding(self) -> Expr:
-        """How close break points of t are that are passed at once."""
-        return self.source.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
-
     def at_reset(
         self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
     ) -> list[SomeRows]:
         """Return what follows the states where a block jumps."""
         source, graph, places = self.source, self.source.graph, self.places
-        before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
+        before = self._before_all
         rows: dict[int, Expr] = {}
         for expr, size in states:
             rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
         rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
-        later = self._after(rows, source.arriving)
-        earlier = self.sides.earlier([e for e, _ in source.arriving])
-        pairs = [*zip(earlier, later, strict=True)]
+        flow = source.moving(source.flow, source.committed)
+        lines = self._seen(source.single_arriving, flow)
+        later = [[e for e, _ in self._after(rows, [(e, 1) for e in line])] for line in lines]
+        earlier = self._earlier(source.single_arriving)
         # what is reset to where it has fallen has moved by as little as a step ends behind that
         atol = graph.leaf("p", source.extended.slot("atol").offset, None)
-        sent = self._differ(pairs, graph.op("mul", graph.const(_UNSEEN), atol))
-        when, together = self._when_reset(guards)
+        unseen = graph.op("mul", graph.const(_UNSEEN), atol)
+        sent = self._sent(self._seen(earlier, before), later, unseen)
+        when, together = self.when.reset(guards)
         broken, after = graph.op("or", when.grazes, together), []
         for j, move in enumerate(when.moves):
             after += self._jumped(j, rows, before, behind, move, broken)
@@ -123,30 +143,62 @@ class Saltation:
             after.append((graph.leaf("x", m, None) if m in source.switched else stands, 1))
         after.append((self._first(places.grazing, when.grazes), 1))
         moves = self.returning.counts(when, sent)
-        after.append((self._lost_in_delay(moves), 1))
+        after.append((self._lost_in_delay(self._any(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
-        return [*after, *self.returning.sent(moves, earlier, later, when.moves)]
+        brought = self._brought(before, when.moves)
+        now = [line[0] for line in later]
+        return [*after, *self.returning.sent(moves, earlier, now, when.moves, brought)]
+
+    def _brought(
+        self, before: Sequence[SomeRows], moves: Sequence[Expr]
+    ) -> Callable[[int, Sequence[Expr]], list[Expr]]:
+        """Return what has the derivatives of numbers right before a time that moves."""
+
+        def rows(j: int, exprs: Sequence[Expr]) -> list[Expr]:
+            _, of = self._arriving(j, before, moves[j])
+            return self._through(exprs, self.returning.bringing(j, of), moves[j])
+
+        return rows
 
     def at_arrival(self) -> list[SomeRows]:
         """Return what follows the states where a jump leaves a delay."""
         source, graph, returning = self.source, self.source.graph, self.returning
-        when = when_of(graph, returning.causes, self.places.by, self._rounding)
-        flow = returning.earlier([e for e, _ in source.flow])
-        flow_before = [(e, size) for e, (_, size) in zip(flow, source.flow, strict=True)]
-        before = source.moving(flow_before, returning.earlier(source.committed))
+        when, before = self.returning.when, self._before_all
         behind = source.moving(source.flow, source.committed)
-        rows: list[SomeRows] = []
+        driving, rows = returning.earlier(self._driving), []
         for j, move in enumerate(when.moves):
+            states = []
             for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
                 moved = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
-                rows.append((graph.op("select", when.apart, graph.const(0.0), moved), size))
-        rows.append((self._first(self.places.together, when.apart), 1))
-        arriving = returning.earlier([e for e, _ in source.arriving])
-        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+                states.append((moved, size))
+            if self.places.turns:
+                across = self._across(j, before, behind, move, driving)
+                states = rows_replaced(graph, states, across)
+            rows += [(graph.op("select", when.apart, graph.const(0.0), s), n) for s, n in states]
+        if self.places.turns:
+            rows += self.sides.now[len(self.sides.sides) :]
+        together = graph.op("or", when.apart, returning.several)
+        rows.append((self._first(self.places.together, together), 1))
+        arriving = self._earlier(source.single_arriving)
+        sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
+        sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
         moves = self.returning.counts(when, sent)
-        rows += returning.sent(moves, arriving, source.arriving, when.moves)
+        brought = self._brought(before, when.moves)
+        rows += returning.sent(moves, arriving, source.single_arriving, when.moves, brought)
         return [*rows, *returning.arrived]
+
+    def _earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
+        """Return expressions as they were before jumps, those that have just left delays, too."""
+        return self.returning.earlier(self.sides.earlier(exprs))
+
+    @cached_property
+    def _before_all(self) -> list[SomeRows]:
+        """The rates of all states before jumps, those that have just left delays, too."""
+        source = self.source
+        flow = self._earlier([e for e, _ in source.flow])
+        pieces = [(e, size) for e, (_, size) in zip(flow, source.flow, strict=True)]
+        return source.moving(pieces, self._earlier(source.committed))
 
     def _lost_in_delay(self, moves: Expr) -> Expr:
         """Return when a jump whose time moves was first sent through delays that do not keep it."""
@@ -154,9 +206,17 @@ class Saltation:
         return self._first(self.places.jumped, never if self.places.lines else moves)
 
     @cached_property
+    def when(self) -> TimesThatMove:
+        """What may happen at a time that moves."""
+        return TimesThatMove(
+            source=self.source, sides=self.sides, places=self.places, seeds=self.seeds,
+            returning=self.returning,
+        )  # fmt: skip
+
+    @cached_property
     def returning(self) -> Returning:
         """Jumps that come back through delays."""
-        return Returning(source=self.source, places=self.places)
+        return Returning(source=self.source, places=self.places, seeds=self.seeds)
 
     @cached_property
     def turning(self) -> list[tuple[Expr, Expr]]:
@@ -169,10 +229,10 @@ class Saltation:
             for k in range(0 if side.timed else side.rows):
                 level, extent = (graph.item(e, k) for e in (side.here.level, side.here.extent))
                 yes = self._jumps_at(side)
-                rate, cause = self._met(yes, level, extent, self.source.flow)
+                rate, cause = self.when.met(yes, level, extent, self.source.flow)
                 if rate is None:
                     continue
-                noise = self._noise(extent)
+                noise = self.when.noise(extent)
                 still = graph.op("mul", graph.const(_STILL), graph.op("mul", noise, noise))
                 apart = graph.op("sub", still, graph.op("mul", level, rate))
                 near = graph.op("le", graph.op("absolute", level), noise)
@@ -197,21 +257,17 @@ class Saltation:
         return self._first(self.places.grazing, touched)
 
     @cached_property
-    def _turns(self) -> DrivenMemories:
+    def turns(self) -> DrivenMemories:
         """Derivatives of memories that are driven."""
         return DrivenMemories(
             source=self.source, sides=self.sides, places=self.places, seeds=self.seeds
         )  # fmt: skip
 
-    def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
-        """Return the derivative of an expression in a direction."""
-        return self.source.slopes([level], seed)
-
     def at_turns(self) -> dict[int, Expr]:
         """Return what derivatives of memories become where these turn, by their states."""
         places, driven = self.places, self.source.driven
         return {
-            places.derivative(j) + m: self._turns.kept(j, m, at_turn=True)
+            places.derivative(j) + m: self.turns.kept(j, m, at_turn=True)
             for j in range(places.by)
             for m in driven
         }
@@ -230,7 +286,7 @@ class Saltation:
         for _, size in self.source.flow:
             pieces.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return rows_replaced(graph, pieces, {m: self._turns.kept(j, m) for m in self.source.driven})
+        return rows_replaced(graph, pieces, {m: self.turns.kept(j, m) for m in self.source.driven})
 
     def _jumped(
         self,
@@ -268,19 +324,24 @@ class Saltation:
         return arriving, of
 
     def _across(
-        self, j: int, before: Sequence[SomeRows], behind: Sequence[SomeRows], move: Expr
+        self,
+        j: int,
+        before: Sequence[SomeRows],
+        behind: Sequence[SomeRows],
+        move: Expr,
+        driving: Sequence[Expr],
     ) -> dict[int, Expr]:
-        """Return the derivatives of memories behind a condition, by their states."""
+        """Return the derivatives of memories behind a jump, by their states."""
         # What drives them may jump there: first they are what has driven them until then.
         graph, source, driven = self.source.graph, self.source, self.source.driven
         if not driven and not source.catching:
             return {}
         becomes = list(driven.values())
-        earlier = dict(zip(driven, self._driving, strict=True))
+        earlier = dict(zip(driven, driving, strict=True))
         now = {**self._switched, **source.catching, **earlier}
         after = [*source.with_states(becomes, now), *source.catching.values()]
         _, of = self._arriving(j, before, move)
-        changes = self._through(after, of, move)
+        changes = self._through(after, self.returning.bringing(j, of), move)
         left = graph.joined(list(behind))
         rows = {
             m: graph.op("sub", change, graph.op("mul", graph.item(left, m), move))
@@ -344,9 +405,10 @@ class Saltation:
         """Return driven memories after a jump of other states."""
         # First they are what has driven them until then.
         driven = self.source.driven
+        driving = self.returning.earlier(self._driving)
         return {
             m: self.source.with_states([become], {**rows, m: earlier})[0]
-            for (m, become), earlier in zip(driven.items(), self._driving, strict=True)
+            for (m, become), earlier in zip(driven.items(), driving, strict=True)
         }
 
     def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
@@ -381,100 +443,6 @@ class Saltation:
         graph = self.source.graph
         earlier, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
         return graph.op("select", happens, graph.op("minimum", earlier, now), earlier)
-
-    # -- when ------------------------------------------------------------------------------------
-
-    def _when_left(self, jumps: Expr) -> When:
-        """Return how the time moves at which sides have been left; a clock's does not."""
-        graph = self.source.graph
-        free, causes = graph.op("and", self._alone, jumps), []
-        for side in self.sides.sides:
-            for k in range(side.rows):
-                kept, now, level, extent = (
-                    graph.item(e, k)
-                    for e in (side.kept, side.before.now, side.before.level, side.before.extent)
-                )
-                left = graph.op("and", graph.op("ne", kept, now), free)
-                rate, cause = self._met(left, level, extent, self.sides.flow_before)
-                causes += [cause] if rate is not None else []
-        return when_of(graph, causes, self.places.by, self._rounding)
-
-    @property
-    def _alone(self) -> Expr:
-        """Whether neither a clock nor a block has made something jump right now."""
-        graph = self.source.graph
-        last = graph.leaf("x", self.places.last, None)
-        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
-        return graph.op("gt", ago, graph.op("mul", graph.const(2.0), self._rounding))
-
-    def _when_reset(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
-        """Return how the time moves at which a block jumps, and whether two causes differ."""
-        # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
-        # or by what was sampled right now: then that says how the time moves.
-        graph, source = self.source.graph, self.source
-        earlier, fell = self.sides.earlier(guards), graph.const(False)
-        for guard in earlier:
-            sampled = reads([guard], "x", source.program.sampled)
-            fallen = graph.op("lt", guard, graph.const(0.0))
-            fell = graph.op("or", fell, graph.op("and", self._alone, fallen) if sampled else fallen)
-        by_itself, by_jumps = self._when_fallen(earlier), self._when_left(graph.const(True))
-
-        def either(one: Expr, other: Expr) -> Expr:
-            return graph.op("select", fell, one, other)
-
-        left = graph.op("lt", self.sides.margin, graph.const(0.0))
-        when = When(
-            moves=[either(*pair) for pair in zip(by_itself.moves, by_jumps.moves, strict=True)],
-            grazes=either(by_itself.grazes, by_jumps.grazes),
-            apart=either(by_itself.apart, by_jumps.apart),
-            happens=either(by_itself.happens, by_jumps.happens),
-        )  # fmt: skip
-        return when, either(left, by_jumps.apart)
-
-    def _when_fallen(self, guards: Sequence[Expr]) -> When:
-        """Return how the time moves at which a guard has fallen: the nearest to 0."""
-        graph = self.source.graph
-        far = nearest = graph.const(_FAR)
-        yes, fallen_guards = graph.const(True), []
-        for guard in guards:
-            guard = bounded(graph, guard)
-            size = graph.op("absolute", guard)
-            rate, cause = self._met(yes, guard, size, self.sides.flow_before)
-            if rate is not None:
-                fallen = graph.op("lt", guard, graph.const(0.0))
-                ago = graph.op("absolute", graph.op("div", guard, rate))
-                ago = graph.op("select", fallen, ago, far)
-                fallen_guards.append((ago, cause))
-                nearest = graph.op("minimum", nearest, ago)
-        causes = [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
-        return when_of(graph, causes, self.places.by, self._rounding)
-
-    def _met(
-        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]
-    ) -> tuple[Expr | None, Cause]:
-        """Return the rate of a level, None where it stands still, and what it is the cause of."""
-        graph, source = self.source.graph, self.source
-        forward = source.time(flow)
-        (rate,) = self.source.slopes([level], forward)
-        if rate is None:
-            return None, Cause(met=met, moves=[], grazes=graph.const(False))
-        (bend,) = self.source.slopes([rate], source.time(flow, delays_move=False))
-        noise = self._noise(extent)
-        bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
-        least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)
-        grazes = graph.op("le", graph.op("mul", rate, rate), least)
-        moves = []
-        for seed in self.seeds:
-            (change,) = self.change(level, seed)
-            zero = graph.const(0.0)
-            moves.append(graph.op("neg", graph.op("div", change, rate)) if change else zero)
-        return rate, Cause(met=met, moves=moves, grazes=grazes)
-
-    def _noise(self, extent: Expr) -> Expr:
-        """Return how well a number of some size is known."""
-        graph, slot = self.source.graph, self.source.extended.slot
-        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
-        return graph.op("add", graph.op("mul", rtol, extent), atol)
 
 
 def _sum(graph: Graph, one: Taken, other: Taken) -> Taken:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from enum import IntEnum
 from typing import Any
 
 import control as ct
@@ -16,8 +17,18 @@ from ..native.diagram.nodes import Node
 from ..native.diagram.parameters import Slot, length
 from ..native.diagram.schedule import Schedule
 from ..native.diagram.wiring import Signal
+from ..native.histories import direct_lines
 
 _OWNERS = 4  # blocks of the derivatives' own: see `Extended.owner`
+
+
+class Sent(IntEnum):
+    """What is sent through each delay next to its signal; each has what those before it have."""
+
+    DERIVATIVES = 0
+    JUMPS = 1  # their number, heights and times, see `returning`
+    RATES = 2  # of the signal: by its delay is differentiated, or a condition reads it
+    TURNS = 3  # what is needed where a memory behind the delay reverses
 
 
 class ScheduleWithRates(Schedule):
@@ -40,18 +51,38 @@ class Extended:
     owner: int
     lines: int  # number of delayed signals
     by: int  # number of quantities
-    returns: bool  # whether jumps are sent through these, see `returning`
-    rated: bool  # and the rates of delayed signals, by whose delays is differentiated
+    sent: Sent  # what lines there are
+    direct: np.ndarray  # whether what arrives at a line is at once made of what leaves another
 
     @property
     def groups(self) -> int:
         """Number of lines for each delayed signal, besides its own."""
-        return self.rates + self.rated if self.returns else self.by
+        return count_groups(self.by, self.sent)
 
     @property
     def rates(self) -> int:
         """The group of the rates of delayed signals."""
-        return self.by + 2 + self.by
+        return count_groups(self.by, Sent.JUMPS)
+
+    @property
+    def bends(self) -> int:
+        """The group of the rates of these rates; those of the derivatives follow."""
+        return self.rates + 1
+
+    @property
+    def brought(self) -> int:
+        """The first group of the derivatives of signals at times of jumps that move."""
+        return self.bends + 1 + self.by
+
+    def group_of_rates(self, group: int) -> int | None:
+        """Return the group that has the rates of another, None if there is none."""
+        if group == -1 and self.sent >= Sent.RATES:
+            return self.rates
+        if self.sent >= Sent.TURNS:
+            if 0 <= group < self.by:
+                return self.bends + 1 + group
+            return self.bends if group == self.rates else None
+        return None
 
     def is_delay(self, place: int) -> list[bool]:
         """Return of which delayed signals a parameter is the delay."""
@@ -86,14 +117,11 @@ def _nothing(t: float, x: object, u: object, params: object) -> Any:
     return np.zeros(0)
 
 
-def extended(
-    compiled: Compiled, outputs: Sequence[Any], by: int, returns: bool, rated: bool
-) -> Extended:
+def extended(compiled: Compiled, outputs: Sequence[Any], by: int, sent: Sent) -> Extended:
     """Return the schedule of a diagram with room for its derivatives by so many quantities."""
-    # `returns` and `rated` are as the record has them.
     read = compiled.schedule
     before, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
-    groups = by + (2 + by if returns else 0) + rated
+    groups = count_groups(by, sent)
     delays = [_derivative_of(read, i, j) for j in range(groups) for i in range(len(read.lines))]
     nothing = Node(
         path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
@@ -112,9 +140,15 @@ def extended(
     }
     return Extended(
         schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
-        owner=len(nodes) - _OWNERS, lines=len(read.lines), by=by, returns=returns,
-        rated=rated,
+        owner=len(nodes) - _OWNERS, lines=len(read.lines), by=by, sent=sent,
+        direct=direct_lines(read),
     )  # fmt: skip
+
+
+def count_groups(by: int, sent: Sent) -> int:
+    """Return how many lines there are for each delayed signal, besides its own."""
+    more = {Sent.JUMPS: 2 + by, Sent.RATES: 1, Sent.TURNS: 1 + 2 * by}
+    return by + sum(count for what, count in more.items() if what <= sent)
 
 
 def has_constant_delays(compiled: Compiled) -> bool:
@@ -162,11 +196,9 @@ def with_derivatives(
     compiled: Compiled, extended_program: Extended, states: int, outputs: int, by: int
 ) -> Schedule:
     """Return the schedule of the program: what arrives, and what leaves which line at once."""
-    from ..native.histories import direct_lines
-
     direct, lines = direct_lines(compiled.schedule), extended_program.schedule.lines
     arriving = []
-    signals = set(range(extended_program.lines)) if extended_program.returns else set()
+    signals = set(range(extended_program.lines)) if extended_program.sent else set()
     for j in range(-1, extended_program.groups):
         for row in direct:
             reached = {

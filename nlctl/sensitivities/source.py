@@ -21,7 +21,7 @@ from ..expressions.arrays import Tracer
 from ..expressions.bends import only_bends, replaced_parts
 from ..expressions.conditions import conditions, switching_function
 from ..expressions.continuity import may_jump
-from ..expressions.dependence import rows_read
+from ..expressions.dependence import reads, rows_read
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
 from ..native import Compiled
@@ -31,9 +31,9 @@ from ..native.diagram.program import Program, count_switching_functions, memory
 from ..native.diagram.trace import traced_arguments
 from ..native.equations.blocks import Equations, equations
 from ..sliding.relay import SLIDING
-from .branches import jumping
+from .branches import by_comparisons, jumping
 from .directions import Direction, SomeRows, from_time, one_sided, rows_replaced, slopes, taken
-from .schedule import Extended
+from .schedule import Extended, Sent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,8 +111,18 @@ class EquationParts:
     @cached_property
     def arriving(self) -> list[SomeRows]:
         """What arrives at the delays."""
-        return _behind(self.graph, self.equations.pieces("y"), len(self.extended.schedule.outputs)
-                       - self.extended.lines)  # fmt: skip
+        pieces = _behind(self.graph, self.equations.pieces("y"), len(self.extended.schedule.outputs)
+                         - self.extended.lines)  # fmt: skip
+        if self.extended.sent < Sent.TURNS:
+            return pieces
+        # a memory behind a delay may turn at a corner: its rate jumps there, by a comparison
+        chosen = by_comparisons(self.graph, [e for e, _ in pieces])
+        return [(e, size) for e, (_, size) in zip(chosen, pieces, strict=True)]
+
+    @cached_property
+    def single_arriving(self) -> list[Expr]:
+        """What arrives at each delay."""
+        return [self.graph.item(e, k) for e, size in self.arriving for k in range(size)]
 
     @cached_property
     def jumps(self) -> list[Expr]:
@@ -125,7 +135,12 @@ class EquationParts:
             )
         # what jumps may also make a memory switch, or a guard fall
         roots = [*self._flowing, *self.of_memories, *self.guards]
-        return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
+        turns = self.extended.sent >= Sent.TURNS
+        cornered = set(jumping([e for e, _ in self.arriving] if turns else []))
+        return [
+            e for e in jumping(roots)
+            if e in cornered or not only_bends(self.graph, roots, e, self.p)
+        ]  # fmt: skip
 
     @property
     def _flowing(self) -> list[Expr]:
@@ -169,18 +184,23 @@ class EquationParts:
         pieces: Sequence[SomeRows],
         time: Expr | None = None,
         delays_move: bool = True,
-        rated: bool = False,
     ) -> Direction:
         """Return the direction in which everything goes with these rates of the states."""
-        # By `time`, 1 if it is None. The rates of delayed signals count as 0 unless `delays_move`,
-        # and are known where they are `rated`.
-        first = self.extended.schedule.ninputs - self.extended.schedule.rates
-        extended_program = self.extended
-        lines = range(self.inputs, first if delays_move else self.inputs)
-        rates = self.inputs + extended_program.line(extended_program.rates, 0)
-        rates = rates if rated else None
-        outside = from_time(self.graph, time, self.inputs, first, lines, rates)
+        # By `time`, 1 if it is None. Rates of delayed signals that are not known are refused, and
+        # count as 0 unless `delays_move`.
+        lines = self.delayed if delays_move else range(0)
+        outside = from_time(self.graph, time, lines, self._row_of_rate)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
+
+    def _row_of_rate(self, row: int) -> int | None:
+        """Return which row of the inputs has the rate of another, None if none has."""
+        extended_program = self.extended
+        schedule, lines = extended_program.schedule, extended_program.lines
+        if row < self.inputs:
+            return schedule.ninputs - schedule.rates + row
+        group, i = divmod(row - self.inputs, lines) if lines else (0, 0)
+        rates = extended_program.group_of_rates(group - 1)
+        return None if rates is None else self.inputs + extended_program.line(rates, i)
 
     def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:
         """Return the rates of all states, those of memories that are driven included."""
@@ -193,6 +213,91 @@ class EquationParts:
         ahead = one_sided(self.graph, list(driven.values()), direction, solutions)
         rates = self.changes(ahead, direction)
         return rows_replaced(self.graph, flow, dict(zip(driven, rates, strict=True)))
+
+    @property
+    def drives_by_delays(self) -> bool:
+        """Whether what leaves delays drives a memory, or the rate of what does."""
+        if not self._reads_delays(list(self.driven.values())):
+            return False
+        self._check_samples()
+        nodes = self.extended.schedule.nodes
+        specs = [
+            nodes[line.block or 0].system.current_spec for line in self.extended.schedule.lines
+        ]
+        if any(spec.varying is not None for spec in specs):
+            raise CompileError(
+                "a memory is driven by a signal whose delay varies, of which rates are not kept: "
+                "derivatives of that are not known; take differences of runs"
+            )
+        if reads([e for e, _ in self.arriving], "x", self.driven):
+            raise CompileError(
+                "a memory is driven by what another one moves, through a delay: where that sets "
+                "out is not sent through it; take differences of runs"
+            )
+        return True
+
+    @property
+    def switches_by_delays(self) -> bool:
+        """Whether what leaves delays, or its size, says when something jumps."""
+        arguments = [self.graph.number(a) for jump in self.jumps for a in jump.args]
+        exprs = [*arguments, *self.of_memories, *self.guards]
+        if reads(exprs, "u", self._delayed_samples):
+            raise CompileError(
+                "when something jumps depends on samples that come through a delay: when these "
+                "jump there is not known; put a lag in between (nlctl.Lag), or take differences "
+                "of runs"
+            )
+        return self._reads_delays(exprs)
+
+    @property
+    def _delayed_samples(self) -> set[int]:
+        """The rows of the inputs that leave delays of what is made of samples at once."""
+        direct, sampled = self.extended.direct, self.program.sampled
+        lines = {i for i, e in enumerate(self.single_arriving) if reads([e], "x", sampled)}
+        for _ in range(len(direct)):
+            lines |= {i for i in range(len(direct)) if any(direct[i, k] for k in lines)}
+        return {self.inputs + i for i in lines}
+
+    def _check_samples(self) -> None:
+        """Refuse a memory that samples drive through a delay together with anything else."""
+        # Alone they move it only where they jump, and it keeps what it is moved to then.
+        for become in self.driven.values():
+            rows = self._delayed_samples
+            if not reads([become], "u", rows):
+                continue
+            delayed = [self.single_arriving[row - self.inputs] for row in rows]
+            leaves = [leaf for leaf in needed([become, *delayed]) if leaf.op == "leaf"]
+            still = {*self.program.sampled, *self.driven}
+            others = any(
+                leaf.data[0] == "t"
+                or (leaf.data[0] == "x" and not still.issuperset(rows_read(leaf)))
+                or (leaf.data[0] == "u" and not rows.issuperset(rows_read(leaf)))
+                for leaf in leaves
+            )
+            if others or len(rows) > 1:
+                raise CompileError(
+                    "a memory is driven by samples that come through a delay, and by something "
+                    "else: what it is driven to before they jump is not known; put a lag in "
+                    "between (nlctl.Lag), or take differences of runs"
+                )
+
+    def _reads_delays(self, exprs: Sequence[Expr]) -> bool:
+        """Return whether expressions, or their rates, are made of what leaves delays."""
+        rates = self.changes(exprs, self.time(self.flow, delays_move=False))
+        return reads([*exprs, *rates], "u", self.delayed)
+
+    @property
+    def delayed(self) -> range:
+        """The rows of the inputs that leave delays."""
+        return range(self.inputs, self.inputs + self.extended.lines)
+
+    def flowing(self, flow: Sequence[SomeRows], seeds: Sequence[Direction]) -> list[SomeRows]:
+        """Return rates of the states, and behind them those of their derivatives."""
+        pieces = list(flow)
+        for seed in seeds:
+            rates = self.changes([e for e, _ in self.flow], seed)
+            pieces += [(e, size) for e, (_, size) in zip(rates, self.flow, strict=True)]
+        return pieces
 
     def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:
         """Return the derivatives of expressions along a direction, None where they are 0."""

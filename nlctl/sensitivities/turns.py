@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..errors import CompileError
-from ..expressions.dependence import reads
-from ..expressions.graph import Expr
-from .corners import at_corner, corners_of
+from ..expressions.dependence import reads, rows_read
+from ..expressions.graph import Expr, needed
+from .causes import Cause, when_of
+from .corners import Corner, at_corner, corners_of
 from .directions import Direction
 from .names import StatePlaces
 from .sides import KeptSides
 from .source import EquationParts
+
+_SAME = 1e-9  # of a memory: it is where it was driven to
+_FAR = 5e5  # a memory that is driven is kept at least so far away
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,70 +28,146 @@ class DrivenMemories:
     sides: KeptSides
     places: StatePlaces
     seeds: Sequence[Direction]
+    _known_corners: dict[Expr, list[Corner]] = field(default_factory=dict)
 
     def kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
         """Return the derivative of a memory, which is integrated only while it is not driven."""
-        # A step ends a little behind where it has reversed.
-        graph = self.source.graph
-        kept = self.sides.memories[m]
-        become = self.source.driven[m]
-        self._check_driven(become)
-        (change,) = self.source.slopes([become], self.seeds[j])
-        derivative = graph.const(0.0) if change is None else change
-        if at_turn and change is not None:
-            late, flowing = self._late(become), list(self.source.flow)
-            for i in range(self.places.by):
-                rates = self.source.changes([e for e, _ in self.source.flow], self.seeds[i])
-                sizes = (size for _, size in self.source.flow)
-                flowing += zip(rates, sizes, strict=True)
-            forward = self.source.time(flowing, delays_move=False)
-            (rate,) = self.source.slopes([change], forward)
-            if rate is not None:
-                derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
-        if at_turn and m in self._at_corners:
-            here, there = self._at_corners[m]
-            derivative = graph.op("select", here, there[j], derivative)
+        graph, become = self.source.graph, self.source.driven[m]
+        derivative = self.turned(become, j) if at_turn else self._change(become, j)
         (derivative,) = self.sides.kept([derivative])
-        moved = graph.op("ne", graph.leaf("x", m, None), kept)
+        if at_turn:
+            derivative = self._at_tick(m, j, derivative)
+        # it stays as it was where it begins to be driven
+        moved = self.has_turned(m) if at_turn else self._has_moved(m)
         integrated = graph.leaf("x", self.places.derivative(j) + m, None)
         return graph.op("select", moved, derivative, integrated)
 
-    def _check_driven(self, become: Expr) -> None:
-        """Refuse a memory that is driven by a delayed signal."""
-        # When that turns is known by its rate, and whether there is a corner by both of them.
-        source = self.source
-        delayed = range(source.inputs, source.inputs + source.extended.lines)
-        if reads([become], "u", delayed):
-            raise CompileError(
-                "a memory is driven by a delayed signal, whose rate is not kept: put a lag behind "
-                "the delay (nlctl.Lag), or take differences of runs"
-            )
+    def turned(self, level: Expr, j: int) -> Expr:
+        """Return the derivative of a number where that turns."""
+        # A step ends a little behind that.
+        source, graph = self.source, self.source.graph
+        derivative = change = self._change(level, j)
+        forward = source.time(source.flowing(source.flow, self.seeds), delays_move=False)
+        recent, late = self._late(level)
+        (rate,) = source.slopes([change], forward)
+        if rate is not None:
+            late = graph.op("select", recent, late, graph.const(0.0))
+            derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
+        if self._is_moved_by_delay(j, level):
+            # a break of an input, whose time moves behind the delay as that does
+            scale = graph.leaf("p", source.extended.slot("scale").offset + j, None)
+            (rate,) = source.changes([level], forward)
+            moved = graph.op("add", derivative, graph.op("mul", scale, rate))
+            derivative = graph.op("select", recent, derivative, moved)
+        corners = self.corners(level)
+        if corners:
+            here, there = at_corner(source, level, corners, self.seeds)
+            derivative = graph.op("select", here, there[j], derivative)
+        return derivative
+
+    def _is_kept(self, m: int, before: Expr) -> Expr:
+        """Return whether a memory is where it was driven to before a clock has ticked."""
+        graph, now = self.source.graph, self.source.graph.leaf("x", m, None)
+        gap = graph.op("absolute", graph.op("sub", now, before))
+        size = graph.op("add", graph.op("absolute", now), graph.const(1.0))
+        return graph.op("le", gap, graph.op("mul", graph.const(_SAME), size))
+
+    @property
+    def sampled(self) -> list[int]:
+        """The states that are samples, then their derivatives."""
+        groups = [0, *(self.places.derivative(j) for j in range(self.places.by))]
+        return [first + i for first in groups for i in self.source.program.sampled]
+
+    def _at_tick(self, m: int, j: int, turned: Expr) -> Expr:
+        """Return the derivative of a memory that turns where what drives it is sampled."""
+        # What it was until then has been kept, unless the jump has gone further.
+        graph, places, sampled = self.source.graph, self.places, self.source.program.sampled
+        level = self.source.driven[m]
+        if not (places.samples and reads([level], "x", sampled)):
+            return turned
+        earlier = {
+            state: graph.leaf("x", places.earlier + k, None) for k, state in enumerate(self.sampled)
+        }
+        before, change = self.sides.kept(
+            self.source.with_states([level, self._change(level, j)], earlier)
+        )
+        (after,) = self.source.with_states([level], {m: before})
+        kept = graph.op("select", self._is_kept(m, before), change, self._change(after, j))
+        ticked = graph.leaf("x", places.ticked, None)
+        gap = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), ticked))
+        rounding = graph.leaf("p", self.source.extended.slot("rounding").offset, None)
+        here = graph.op("le", gap, rounding)
+        return graph.op("select", here, kept, turned)
+
+    def _change(self, level: Expr, j: int) -> Expr:
+        return self.source.changes([level], self.seeds[j])[0]
+
+    def _has_moved(self, m: int) -> Expr:
+        return self.source.graph.op(
+            "ne", self.source.graph.leaf("x", m, None), self.sides.memories[m]
+        )
+
+    def has_turned(self, m: int) -> Expr:
+        """Return whether a memory has been moved, and is not being moved any more."""
+        graph = self.source.graph
+        stands = graph.op("not", self.is_far(m, graph.leaf("x", m, None)))
+        return graph.op("and", self._has_moved(m), stands)
+
+    def is_far(self, m: int, kept: Expr) -> Expr:
+        """Return whether a memory is kept far away from where it is moved."""
+        graph = self.source.graph
+        gap = graph.op("sub", kept, self.source.driven[m])
+        return graph.op("gt", graph.op("absolute", gap), graph.const(_FAR))
 
     @cached_property
-    def _at_corners(self) -> dict[int, tuple[Expr, list[Expr]]]:
-        """Return of memories that corners may drive whether one does, and what they keep then."""
-        source, kept = self.source, {}
-        for m, become in source.driven.items():
-            corners = corners_of(source, become, self.seeds, self._longest)
-            if corners:
-                kept[m] = at_corner(source, become, corners, self.seeds)
-        return kept
+    def corners_apart(self) -> dict[int, Expr]:
+        """Whether memories are driven by two corners now, each of which moves otherwise."""
+        graph, slot = self.source.graph, self.source.extended.slot("rounding")
+        rounding, no, apart = graph.leaf("p", slot.offset, None), graph.const(False), {}
+        for m, become in self.source.driven.items():
+            causes = [Cause(met=c.here, moves=c.moves, grazes=no) for c in self.corners(become)]
+            if len(causes) > 1:
+                apart[m] = when_of(graph, causes, self.places.by, rounding).apart
+        return apart
+
+    def corners(self, level: Expr) -> list[Corner]:
+        """Return the corners of a number."""
+        if level not in self._known_corners:
+            corners = corners_of(self.source, level, self.seeds, self._longest)
+            self._known_corners[level] = corners
+        return self._known_corners[level]
 
     @property
     def _longest(self) -> Expr:
         """How late a turn may be seen."""
         return self.source.graph.leaf("p", self.source.extended.slot("late").offset, None)
 
-    def _late(self, become: Expr) -> Expr:
-        """Return how long ago what drives a memory has reversed, 0 at a break."""
+    def _is_moved_by_delay(self, j: int, become: Expr) -> bool:
+        """Whether breaks of inputs that drive a memory move as a quantity, a delay, does."""
+        source = self.source
+        if not (source.inputs and any(self.places.delays[j])):
+            return False
+        by = {
+            self.places.delays[j][row - source.inputs] if row >= source.inputs else False
+            for leaf in needed([become])
+            if leaf.op == "leaf" and leaf.data[0] == "u"
+            for row in rows_read(leaf)
+        }
+        if len(by) > 1 or source.extended.direct.any():
+            raise CompileError(
+                "a memory is driven by inputs that come through several ways, of which one has a "
+                "delay that is differentiated by: where inputs have kinks that is not known; take "
+                "differences of runs"
+            )
+        return by == {True}
+
+    def _late(self, become: Expr) -> tuple[Expr, Expr]:
+        """Return whether what drives a memory has just reversed smoothly, and how long ago."""
         # Where it turns is located by a difference of rates: a little too early or too late.
         graph, source = self.source.graph, self.source
         zero = graph.const(0.0)
         forward = source.time(source.flow, delays_move=False)
         (rate,) = self.source.slopes([become], forward)
         (bend,) = self.source.slopes([rate or zero], forward)
-        if bend is None:
-            return zero
-        late = graph.op("div", rate or zero, bend)
-        recent = graph.op("le", graph.op("absolute", late), self._longest)
-        return graph.op("select", recent, late, zero)
+        late = graph.op("div", rate or zero, bend or zero)
+        return graph.op("le", graph.op("absolute", late), self._longest), late

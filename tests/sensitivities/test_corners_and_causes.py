@@ -3,40 +3,9 @@
 import control as ct
 import numpy as np
 import pytest
+from closed_form_runs import CORNERS, A, P, R, integral, source
 
 import nlctl
-from nlctl.errors import CompileError
-
-A, P, R = 1.0, 0.7, 1.3  # height and place of a corner, and a rate
-
-
-def source(output, params, rate=None):
-    """Signals of t and of x = rate t."""
-    return ct.nlsys(
-        lambda t, x, u, p: [p[rate] if rate else 1.0], output, inputs=0, outputs=["u"],
-        states=["x"], params=params, name="source",
-    )  # fmt: skip
-
-
-def integral(inp="v"):
-    return ct.nlsys(
-        lambda t, x, u, p: [u[0]], lambda t, x, u, p: [x[0]], inputs=[inp], outputs=["y"],
-        states=["y"], name="integral",
-    )  # fmt: skip
-
-
-CORNERS = {
-    "abs of t": lambda t, x, u, p: [p["A"] - np.abs(t - p["P"])],
-    "abs": lambda t, x, u, p: [p["A"] - np.abs(x[0] - p["P"])],
-    "min": lambda t, x, u, p: [np.minimum(x[0] - p["P"], p["P"] - x[0]) + p["A"]],
-    "max": lambda t, x, u, p: [p["A"] - np.maximum(x[0] - p["P"], p["P"] - x[0])],
-    "where": lambda t, x, u, p: [
-        np.where(x[0] > p["P"], p["P"] - x[0], x[0] - p["P"]) + p["A"]
-    ],
-    "sign": lambda t, x, u, p: [p["A"] - np.sign(x[0] - p["P"]) * (x[0] - p["P"])],
-    "root": lambda t, x, u, p: [p["A"] - np.sqrt((x[0] - p["P"]) ** 2)],
-    "remainder": lambda t, x, u, p: [p["A"] - np.abs(np.mod(x[0] - p["P"] + 2, 4) - 2)],
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
@@ -180,11 +149,102 @@ def test_narrow_functions_are_followed(method):
     assert made.derivatives[0, :, -1] == pytest.approx([-np.sqrt(np.pi) / R**2, 0, 0], abs=1e-5)
 
 
-def test_memories_behind_delays_are_refused():
-    """Where they turn is not known to the last digit without the rate, a corner not at all."""
-    wire = nlctl.block(nlctl.TransportDelay(inputs=("u",), outputs=("s",), delay=0.2), "wire")
-    moving = source(lambda t, x, u, p: [np.sin(x[0] * p["w"])], {"w": 3.0})
-    gap = nlctl.block(nlctl.Backlash(), "gap", inputs=["s"], outputs=["v"])
-    loop = nlctl.interconnect([wire, moving, gap], inputs=[], outputs=["v"], name="loop")
-    with pytest.raises(CompileError, match="a memory is driven by a delayed signal"):
-        nlctl.sensitivity_response(loop, [0, 1], with_respect_to="source.w")
+TENTS = {
+    "of t": lambda t, x, u, p: [p["A"] - np.abs(t - p["P"])],
+    "of a state": lambda t, x, u, p: [p["A"] - np.abs(x[0] - p["P"])],
+}
+
+
+@pytest.mark.parametrize("above", [0.0, 1e-4, -1e-4])
+@pytest.mark.parametrize("delay", [None, 0.2])
+@pytest.mark.parametrize("law", TENTS)
+def test_memory_that_is_touched_at_a_corner(law, delay, above):
+    """The tip A of a tent comes to A - r, where the memory stands: v = max(m, A - r) from then."""
+    gap = nlctl.block(
+        nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.5), "gap",
+        inputs=["u" if delay is None else "s"], outputs=["v"],
+    )  # fmt: skip
+    parts = [source(TENTS[law], {"A": A, "P": P}), gap]
+    if delay is not None:
+        line = nlctl.TransportDelay(inputs=("u",), outputs=("s",), delay=delay, before=A - P)
+        parts.append(nlctl.block(line, "wire"))
+    loop = nlctl.interconnect(parts, inputs=[], outputs=["v"], name="loop")
+    tip, by = P + (delay or 0.0), ["source.A", "gap.c_r", "gap.memory(0)"]
+    made = nlctl.sensitivity_response(
+        loop, [0, tip - 0.1, tip + 0.2], 0, {"gap.memory": 0.5 + above}, with_respect_to=by
+    )
+    assert made.values[0] == pytest.approx([0.5 + above, 0.5 + above, 0.5 + max(above, 0.0)])
+    assert np.allclose(made.derivatives[0, :, 1], [0, 0, 1], rtol=0, atol=1e-9)
+    if above:
+        slopes = [0, 0, 1] if above > 0 else [1, -1, 0]
+        assert made.derivatives[0, :, 2] == pytest.approx(slopes, abs=1e-7)
+        return
+    (lack,) = made.missing
+    assert lack.time == pytest.approx(tip, abs=1e-6)
+    assert lack.where == "memory of 'gap'"
+    assert "touched at its end" in lack.why
+    assert np.isnan(made.derivatives[0, :, 2]).all()
+
+
+def test_tips_that_touch_what_the_first_has_left():
+    """All tips of a wave reach as far, also if that is changed: v = A - r from the first on."""
+    loop = nlctl.interconnect(
+        [source(lambda t, x, u, p: [p["A"] * (1 - np.abs(np.sin(t)))], {"A": A}),
+         nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.6, c_l=-0.6), "gap",
+                     inputs=["u"], outputs=["v"])],
+        inputs=[], outputs=["v"], name="loop",
+    )  # fmt: skip
+    made = nlctl.sensitivity_response(
+        loop, np.arange(0, 12, 2.0), with_respect_to=["source.A", "gap.c_r"]
+    )
+    assert not made.missing
+    assert np.allclose(made["v", "source.A"], 1, rtol=0, atol=1e-7)
+    assert np.allclose(made["v", "gap.c_r"], -1, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05])
+def test_two_corners_at_once(apart):
+    """v = A - |Q - P| - r from the top of A - |t - P| - |x - Q| on, which has a corner at Q = P."""
+    loop = nlctl.interconnect(
+        [source(lambda t, x, u, p: [p["A"] - np.abs(t - p["P"]) - np.abs(x[0] - p["Q"])],
+                {"A": A, "P": P, "Q": P + apart}),
+         nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3), "gap",
+                     inputs=["u"], outputs=["v"])],
+        inputs=[], outputs=["v"], name="loop",
+    )  # fmt: skip
+    by = ["source.A", "source.P", "source.Q"]
+    made = nlctl.sensitivity_response(loop, [0, P + 0.2], with_respect_to=by)
+    assert made.values[0, -1] == pytest.approx(A - apart - 0.3)
+    if apart:
+        assert made.derivatives[0, :, -1] == pytest.approx([1, 1, -1], abs=1e-7)
+        return
+    (lack,) = made.missing
+    assert lack.time == pytest.approx(P, abs=1e-6)
+    assert "two corners" in lack.why
+
+
+@pytest.mark.parametrize("g", [0.3, 0.8])
+def test_memory_that_turns_at_a_sample(g):
+    """u = x - g x(1) from t = 1 on, x = R t: v keeps R - r, or is pushed to R - g R + r."""
+    law = ct.nlsys(
+        None, lambda t, x, u, p: [-p["g"] * u[0]], inputs=["x"], outputs=["held"],
+        params={"g": g}, name="law",
+    )  # fmt: skip
+    moving = ct.nlsys(
+        lambda t, x, u, p: [p["R"]], lambda t, x, u, p: [x[0], x[0] + u[0]], inputs=["held"],
+        outputs=["x", "u"], states=["x"], params={"R": R}, name="moving",
+    )  # fmt: skip
+    gap = nlctl.block(
+        nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3), "gap", inputs=["u"], outputs=["v"]
+    )
+    loop = nlctl.interconnect(
+        {"law": nlctl.sampled(law, 1.0), "moving": moving, "gap": gap}, outputs=["v"]
+    )
+    by = ["moving.R", "law.g", "gap.c_r", "gap.c_l"]
+    made = nlctl.sensitivity_response(loop, [0, 0.9, 1.1, 1.2], with_respect_to=by)
+    pushed = g > 0.6 / R
+    assert not made.missing
+    assert made.values[0, 2:] == pytest.approx(R - g * R + 0.3 if pushed else R - 0.3)
+    expected = [1 - g, -R, 0, -1] if pushed else [1, 0, -1, 0]
+    for k in (2, 3):
+        assert made.derivatives[0, :, k] == pytest.approx(expected, abs=1e-7)

@@ -64,3 +64,35 @@ def ball_after(t, h0, e, g, bounces):
         if k < bounces - 1:
             since = since + 2 * speed / g
     return speed * (t - since) - g * (t - since) ** 2 / 2
+
+
+A, P, R = 1.0, 0.7, 1.3  # height and place of a corner, and a rate
+
+
+def source(output, params, rate=None):
+    """Signals of t and of x = rate t."""
+    return ct.nlsys(
+        lambda t, x, u, p: [p[rate] if rate else 1.0], output, inputs=0, outputs=["u"],
+        states=["x"], params=params, name="source",
+    )  # fmt: skip
+
+
+def integral(inp="v"):
+    return ct.nlsys(
+        lambda t, x, u, p: [u[0]], lambda t, x, u, p: [x[0]], inputs=[inp], outputs=["y"],
+        states=["y"], name="integral",
+    )  # fmt: skip
+
+
+CORNERS = {
+    "abs of t": lambda t, x, u, p: [p["A"] - np.abs(t - p["P"])],
+    "abs": lambda t, x, u, p: [p["A"] - np.abs(x[0] - p["P"])],
+    "min": lambda t, x, u, p: [np.minimum(x[0] - p["P"], p["P"] - x[0]) + p["A"]],
+    "max": lambda t, x, u, p: [p["A"] - np.maximum(x[0] - p["P"], p["P"] - x[0])],
+    "where": lambda t, x, u, p: [
+        np.where(x[0] > p["P"], p["P"] - x[0], x[0] - p["P"]) + p["A"]
+    ],
+    "sign": lambda t, x, u, p: [p["A"] - np.sign(x[0] - p["P"]) * (x[0] - p["P"])],
+    "root": lambda t, x, u, p: [p["A"] - np.sqrt((x[0] - p["P"]) ** 2)],
+    "remainder": lambda t, x, u, p: [p["A"] - np.abs(np.mod(x[0] - p["P"] + 2, 4) - 2)],
+}  # fmt: skip

@@ -75,6 +75,27 @@ class TestExact:
             found[:, -1], (later - before) / (2 * h), rtol=1e-6, atol=1e-8 * scale
         )
 
+    def test_integers_of_the_call_steer_what_is_differentiated(self):
+        """x' = -1.5^n x, by a loop of n passes: the derivative for every n of a call."""
+
+        def passes(t, x, u, p):
+            y = -x[0]
+            for _ in range(p["n"]):
+                y = 1.5 * y
+            return [y]
+
+        system = ct.nlsys(passes, None, inputs=0, states=["x"], params={"n": 2}, name="loop")
+        compiled = nlctl.compile(system)
+        for n in (2, 5, 0, 5):
+            made = derivatives(compiled, compiled.parameter_vector({"loop.n": n}))
+            assert made is not None
+            v, dx = np.zeros((2, DIRECTIONS)), np.full((1, DIRECTIONS), np.nan)
+            v[0] = np.arange(DIRECTIONS)
+            here = [np.zeros((k, DIRECTIONS)) for k in (1, 0)]
+            made.point(np.zeros(DIRECTIONS), *here, made.c)
+            made.function(np.zeros(DIRECTIONS), *here, made.c, v, dx)
+            assert np.allclose(dx[0], -(1.5**n) * v[0], rtol=1e-14, atol=0)
+
     @pytest.mark.slow
     def test_an_opaque_function_is_differentiated_by_differences_and_named(self):
         """The printed form says which; the numbers are the traced twin's."""

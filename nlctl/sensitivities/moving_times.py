@@ -1,0 +1,117 @@
+"""When something has happened: how the time moves at which sides were left, or a guard fell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..expressions.dependence import reads
+from ..expressions.graph import Expr
+from .branches import bounded
+from .causes import Cause, When, when_of
+from .directions import Direction, SomeRows
+from .names import StatePlaces
+from .returning import Returning
+from .sides import KeptSides
+from .source import EquationParts
+
+_FAR = 1e300
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimesThatMove:
+    """What may happen at a time that moves."""
+
+    source: EquationParts
+    sides: KeptSides
+    places: StatePlaces
+    seeds: Sequence[Direction]
+    returning: Returning
+
+    def left(self, jumps: Expr) -> When:
+        """Return how the time moves at which sides have been left; a clock's does not."""
+        graph = self.source.graph
+        free, causes = graph.op("and", self._alone, jumps), []
+        for side in self.sides.sides:
+            for k in range(side.rows):
+                kept, now, level, extent = (
+                    graph.item(e, k)
+                    for e in (side.kept, side.before.now, side.before.level, side.before.extent)
+                )
+                # what a jump that leaves a delay has taken across has not been met at a rate
+                (now,) = self.returning.earlier([now])
+                left = graph.op("and", graph.op("ne", kept, now), free)
+                rate, cause = self.met(left, level, extent, self.sides.flow_before)
+                causes += [cause] if rate is not None else []
+        return when_of(graph, causes, self.places.by, self.returning.rounding)
+
+    @property
+    def _alone(self) -> Expr:
+        """Whether neither a clock nor a block has made something jump right now."""
+        graph = self.source.graph
+        last = graph.leaf("x", self.places.last, None)
+        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
+        return graph.op("gt", ago, graph.op("mul", graph.const(2.0), self.returning.rounding))
+
+    def reset(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
+        """Return how the time moves at which a block jumps, and whether two causes differ."""
+        # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
+        # or by what was sampled right now: then that says how the time moves.
+        graph, source = self.source.graph, self.source
+        earlier, fell = self.returning.earlier(self.sides.earlier(guards)), graph.const(False)
+        for guard in earlier:
+            sampled = reads([guard], "x", source.program.sampled)
+            fallen = graph.op("lt", guard, graph.const(0.0))
+            fell = graph.op("or", fell, graph.op("and", self._alone, fallen) if sampled else fallen)
+        by_itself, by_jumps = self._fallen(earlier), self.left(graph.const(True))
+        arrived = self.returning.arrives
+        if arrived is not None:
+            by_jumps = by_jumps.unless(arrived, self.returning.when, graph)
+        left = graph.op("lt", self.sides.margin, graph.const(0.0))
+        together = graph.op("select", fell, left, by_jumps.apart)
+        return by_jumps.unless(fell, by_itself, graph), together
+
+    def _fallen(self, guards: Sequence[Expr]) -> When:
+        """Return how the time moves at which a guard has fallen: the nearest to 0."""
+        graph = self.source.graph
+        far = nearest = graph.const(_FAR)
+        yes, fallen_guards = graph.const(True), []
+        for guard in guards:
+            guard = bounded(graph, guard)
+            size = graph.op("absolute", guard)
+            rate, cause = self.met(yes, guard, size, self.sides.flow_before)
+            if rate is not None:
+                fallen = graph.op("lt", guard, graph.const(0.0))
+                ago = graph.op("absolute", graph.op("div", guard, rate))
+                ago = graph.op("select", fallen, ago, far)
+                fallen_guards.append((ago, cause))
+                nearest = graph.op("minimum", nearest, ago)
+        causes = [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
+        return when_of(graph, causes, self.places.by, self.returning.rounding)
+
+    def met(
+        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]
+    ) -> tuple[Expr | None, Cause]:
+        """Return the rate of a level, None where it stands still, and what it is the cause of."""
+        graph, source = self.source.graph, self.source
+        forward = source.time(flow)
+        (rate,) = self.source.slopes([level], forward)
+        if rate is None:
+            return None, Cause(met=met, moves=[], grazes=graph.const(False))
+        (bend,) = self.source.slopes([rate], source.time(flow, delays_move=False))
+        noise = self.noise(extent)
+        bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
+        least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)
+        grazes = graph.op("le", graph.op("mul", rate, rate), least)
+        moves = []
+        for seed in self.seeds:
+            (change,) = source.slopes([level], seed)
+            zero = graph.const(0.0)
+            moves.append(graph.op("neg", graph.op("div", change, rate)) if change else zero)
+        return rate, Cause(met=met, moves=moves, grazes=grazes)
+
+    def noise(self, extent: Expr) -> Expr:
+        """Return how well a number of some size is known."""
+        graph, slot = self.source.graph, self.source.extended.slot
+        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
+        return graph.op("add", graph.op("mul", rtol, extent), atol)
