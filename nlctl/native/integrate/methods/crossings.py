@@ -58,7 +58,7 @@ def first_crossing(p, h, terms, row, side, until, shifted, j):
     extent = abs(terms[p, row, j])
     for k in range(p - 1, 0, -1):
         extent = extent * h + abs(terms[k, row, j])
-    if extent * h < abs(terms[0, row, j]):
+    if extent * h < abs(terms[0, row, j]) or extent == 0.0:  # it is 0 throughout
         return first, farthest
     fell, part = False, 0.0
     for n in range(PLACES_LOOKED_AT + 1):
