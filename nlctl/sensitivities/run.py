@@ -156,10 +156,9 @@ def _start(
     start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
     memories = [*sides.source.driven, *sides.source.catching]
     arrays["x"][memories, 0] = x0[memories]  # from where they are moved
-    for j in range(places.by):
-        pieces = [(e, 1) for e in differentiated.saltation.at_start(j).values()]
-        rows = [places.derivative(j) + m for m in memories]
-        start[rows] = _values(differentiated, pieces, arrays)
+    pieces = [(e, 1) for row in differentiated.saltation.at_start for e in row.values()]
+    rows = [places.derivative(j) + m for j in range(places.by) for m in memories]
+    start[rows] = _values(differentiated, pieces, arrays)
     return start, arrays
 
 

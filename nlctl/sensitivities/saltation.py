@@ -272,11 +272,12 @@ class Saltation:
             for m in driven
         }
 
-    def at_start(self, j: int) -> dict[int, Expr]:
-        """Return derivatives of memories that a run begins by driving, by their states."""
+    @cached_property
+    def at_start(self) -> list[dict[int, Expr]]:
+        """By quantity the derivatives of memories that a run begins by driving, by their states."""
         become = self.source.driven | self.source.catching
-        changes = self.source.changes(list(become.values()), self.seeds[j])
-        return dict(zip(become, changes, strict=True))
+        rows = [self.source.changes(list(become.values()), seed) for seed in self.seeds]
+        return [dict(zip(become, changes, strict=True)) for changes in rows]
 
     # -- states ----------------------------------------------------------------------------------
 
