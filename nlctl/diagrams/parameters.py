@@ -38,8 +38,8 @@ def override(system: ct.NonlinearIOSystem, params: Mapping[str, Any] | None) -> 
     set_parameters(system, parts.given)
     for leaf_block in blocks:
         if "nlctl_overrides" not in vars(leaf_block):  # not a run's own
-            alone = parts.alone.get(id(leaf_block), {})
-            set_keys(current_parameters(leaf_block), alone, str(leaf_block.name))
+            if alone := parts.alone.get(id(leaf_block)):
+                set_keys(current_parameters(leaf_block), alone, str(leaf_block.name))
     return parts.given
 
 
