@@ -95,6 +95,7 @@ _FIELDS = [
     ("stay", "i8"),  # and of Taylor's method where it pays, before it is compared again
     ("wait", "i8"),  # explicit steps before Taylor's method is tried again, if it does not pay
     ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
+    ("leaving", "f8"),  # time from which short steps lead away from where something is equal
     ("ends", "i8"),  # the step being tried ends at a break point of the inputs or at the end
 ]
 LANE = np.dtype((np.record, _FIELDS))
@@ -108,7 +109,7 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
     lanes["status"] = RUNNING
     lanes["left"], lanes["right"] = np.inf, -np.inf
     lanes["rests"] = 1
-    lanes["fell_at"] = np.nan
+    lanes["fell_at"] = lanes["leaving"] = np.nan
     lanes["culprit"] = -1
     lanes["patience"] = FIRST_PATIENCE
     return lanes

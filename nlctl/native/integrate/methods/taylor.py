@@ -152,10 +152,10 @@ def _leaving(task, lane):
     """Return a step that leaves a place where something compared is equal."""
     # Longer each time: it may be equal, to rounding, at the end of a short one as well; and in the
     # end as long as any other.
-    shortest = _shortest(task)
-    if not lane.accepted or lane.last > _LEFT * shortest:
-        return min(lane.h, shortest)
-    longer = _LONGER * max(lane.last, shortest)
+    shortest, gone = _shortest(task), lane.t - lane.leaving
+    if not 0.0 <= gone <= _LEFT * shortest:
+        lane.leaving, gone = lane.t, 0.0
+    longer = max(_LONGER * gone, shortest)
     return lane.h if longer > _LEFT * shortest else min(lane.h, longer)
 
 
