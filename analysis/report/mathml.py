@@ -154,12 +154,18 @@ def _set_row(row: ElementTree.Element) -> None:
         if here.tag == "mo" and here.text in _SIGNS and _opens(before):
             here.set("form", "prefix")
         name, last = _name(here), _name(before)
-        if (name and before.tag not in ("mo", "mspace")) or (last and here.tag in OPERANDS):
+        if (name and before.tag not in ("mo", "mspace")) or (last and _is_operand(here)):
             row.insert(place, ElementTree.Element("mspace", width=THIN))
 
 
 def _opens(element: ElementTree.Element) -> bool:
     return element.tag == "mo" and element.text not in _CLOSING
+
+
+def _is_operand(element: ElementTree.Element) -> bool:
+    """Whether an element is a number, a symbol or a word, and not in brackets."""
+    is_row = element.tag == "mrow" and len(element) > 0
+    return (element[0] if is_row else element).tag in OPERANDS
 
 
 def _name(element: ElementTree.Element) -> bool:

@@ -250,7 +250,9 @@ class TestOverrides:
     def test_a_bad_index_is_refused(self, key):
         """An element that does not exist, or is not written as one, names parameter and block."""
         base = key.partition("[")[0]
-        words = rf"('{re.escape(key)}' is not one number of '{base}'|'{base}' is one).*\(block 'b'\)"
+        words = (
+            rf"('{re.escape(key)}' is not one number of '{base}'|'{base}' is one).*\(block 'b'\)"
+        )
         with pytest.raises(ParameterError, match=words):
             with_overrides(Mixed(), {key: 1.0}, "b")
 

@@ -129,6 +129,8 @@ def test_a_sign_is_close_to_its_number_and_a_function_apart_from_its_factor():
     tags = [e.tag for e in tree(r"q \cos t").find("mrow")]
     assert tags == ["mi", "mspace", "mi", "mspace", "mi"]
     assert tree(r"\cos(t)").find(".//mspace") is None
+    assert tree(r"\cos \mathrm{th}").find(".//mspace") is not None
+    assert tree(r"\cos \left(\mathrm{th} + t\right)").find(".//mspace") is None
 
 
 def test_subset_of_the_subset_keeps_all_that_is_asked_for(tmp_path):
