@@ -37,9 +37,9 @@ def override(system: ct.NonlinearIOSystem, params: Mapping[str, Any] | None) -> 
             leaf_block.nlctl_overrides = parts.alone.get(id(leaf_block), {})
     set_parameters(system, parts.given)
     for leaf_block in blocks:
-        if "nlctl_overrides" not in vars(leaf_block):  # not a run's own
-            if alone := parts.alone.get(id(leaf_block)):
-                set_keys(current_parameters(leaf_block), alone, str(leaf_block.name))
+        alone = parts.alone.get(id(leaf_block))
+        if alone and "nlctl_overrides" not in vars(leaf_block):  # not a run's own
+            set_keys(current_parameters(leaf_block), alone, str(leaf_block.name))
     return parts.given
 
 
