@@ -36,7 +36,7 @@ def commits_at_start(
     moving = [*source.driven, *source.catching]
     rows = [*memories, *(places.derivative(j) + m for j in range(places.by) for m in moving)]
     for _ in memories:  # as often as the engine does
-        behind = values(differentiated, pieces, commits[-1])
+        behind = evaluated_rows(differentiated, pieces, commits[-1])
         same = np.array_equal(behind[: len(memories)], commits[-1]["x"][memories, 0])
         if same and len(commits) > 1:
             break
@@ -58,7 +58,7 @@ def left_where_they_are(source: EquationParts, commits: Sequence[Arrays], k: int
     return [m for m, become in source.driven.items() if reads([become], "x", changed - {m})]
 
 
-def values(
+def evaluated_rows(
     differentiated: Differentiated, pieces: Sequence[SomeRows], arrays: Arrays
 ) -> np.ndarray:
     """Return the rows of some pieces."""

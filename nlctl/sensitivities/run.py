@@ -21,7 +21,7 @@ from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..responses.arguments import input_array, state_array
-from .beginning import Arrays, commits_at_start, values
+from .beginning import Arrays, commits_at_start, evaluated_rows
 from .missing import missing
 from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
@@ -149,10 +149,10 @@ def _start(
     if rated:  # what is sent first may be another than what was before
         layout, lines = differentiated.extended.layout, differentiated.extended.schedule.lines
         before = [p[layout[line.block or 0]["before"].offset] for line in lines[: places.lines]]
-        first = values(differentiated, sides.source.arriving, arrays)
+        first = evaluated_rows(differentiated, sides.source.arriving, arrays)
         start[places.number : places.height] = 1.0
         start[places.height : places.moved] = before - first
-    start[places.kept : places.together] = values(differentiated, sides.now, arrays)
+    start[places.kept : places.together] = evaluated_rows(differentiated, sides.now, arrays)
     memories = [*sides.source.driven, *sides.source.catching]
     commits = commits_at_start(differentiated, x0, arrays)
     rows = [places.derivative(j) + m for j in range(places.by) for m in memories]
