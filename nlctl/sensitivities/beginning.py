@@ -31,8 +31,7 @@ def commits_at_start(
     x[memories, 0] = x0[memories]
     commits = [{**arrays, "x": x}]
     pieces = [(e, 1) for e in source.committed]
-    for j in range(places.by):
-        pieces += [(e, 1) for e in differentiated.saltation.at_start(j).values()]
+    pieces += [(e, 1) for row in differentiated.saltation.at_start for e in row.values()]
     moving = [*source.driven, *source.catching]
     rows = [*memories, *(places.derivative(j) + m for j in range(places.by) for m in moving)]
     for _ in memories:  # as often as the engine does

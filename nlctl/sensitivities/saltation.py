@@ -296,12 +296,13 @@ class Saltation:
         odd = graph.op("lt", graph.leaf("x", self.places.parity, None), graph.const(0.0))
         return [graph.op("select", odd, one, guard), graph.op("select", odd, guard, one)]
 
-    def at_start(self, j: int) -> dict[int, Expr]:
-        """Return derivatives of memories that a run begins by driving, by their states."""
+    @cached_property
+    def at_start(self) -> list[dict[int, Expr]]:
+        """By quantity the derivatives of memories that a run begins by driving, by their states."""
         committed = dict(zip(self.source.program.memory, self.source.committed, strict=True))
         become = {m: committed[m] for m in (*self.source.driven, *self.source.catching)}
-        changes = self.source.changes(list(become.values()), self.seeds[j])
-        return dict(zip(become, changes, strict=True))
+        rows = [self.source.changes(list(become.values()), seed) for seed in self.seeds]
+        return [dict(zip(become, changes, strict=True)) for changes in rows]
 
     # -- states ----------------------------------------------------------------------------------
 
