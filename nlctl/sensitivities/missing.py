@@ -15,6 +15,7 @@ from ..native.happened import row_labels
 from ..native.integrate.state import Status
 from ..native.jacobians import searches_of
 from ..native.results import Trajectory
+from .beginning import Arrays, left_where_they_are
 from .program import Differentiated
 from .record import NoDerivative
 
@@ -37,13 +38,13 @@ def missing(
     of_whom: tuple[Compiled, tuple[str, ...]],
     trajectory: Trajectory,
     given: tuple[np.ndarray, ...],
-    beginning: dict[str, np.ndarray],
+    commits: list[Arrays],
 ) -> list[NoDerivative]:
     """Return why there are no derivatives from some time on, in the order of time."""
     compiled, names = of_whom
     run = _Run(
         differentiated=differentiated, compiled=compiled, names=names, trajectory=trajectory,
-        given=given, beginning=beginning,
+        given=given, commits=commits,
     )  # fmt: skip
     first = sorted(run.later(), key=lambda lack: lack.time)[:1]
     lacks: list[NoDerivative] = []
@@ -63,7 +64,7 @@ class _Run:
     names: tuple[str, ...]
     trajectory: Trajectory
     given: tuple[np.ndarray, ...]  # times, the state at the start, parameters, inputs
-    beginning: dict[str, np.ndarray]  # what memories are driven by at the start, if anything
+    commits: list[Arrays]  # see `commits_at_start`: none if nothing is driven at the start
 
     def later(self) -> list[NoDerivative]:
         """Return why there are none behind the start."""
@@ -101,15 +102,16 @@ class _Run:
 
     def at_first_jump(self) -> list[NoDerivative]:
         """Return by what there are none, as what is sampled or driven at the start has two."""
-        if not self.beginning:
+        if not self.commits:
             return []
         source, last = self.differentiated.sides.source, self.differentiated.places.last
-        sampled = source.program.sampled and self.beginning["x"][last, 0] == self.given[0][0]
+        sampled = source.program.sampled and self.commits[0]["x"][last, 0] == self.given[0][0]
         choices = source.choices if sampled else []
-        return [
-            *self._where_met(choices, self._start, _FIRST),
-            *self._where_met(source.edges, self.beginning, _FIRST),
-        ]
+        lacks = self._where_met(choices, self._start, _FIRST)
+        for k, arrays in enumerate(self.commits):
+            edges = source.edges(left_where_they_are(source, self.commits, k))
+            lacks += self._where_met(edges, arrays, _FIRST)
+        return lacks
 
     def at_kinks(self) -> list[NoDerivative]:
         """Return by what there are none, as the run stays on a kink of its equations."""
@@ -212,8 +214,9 @@ class _Run:
         ordered = source.ordered
         labels = [*(labels[k] for k in ordered), *labels[len(ordered) :]]
         first = self.compiled.program.switching + conditions.rows
-        watching = self.differentiated.touching + bool(source.driven)
-        watching += self.differentiated.sides.watches + self.differentiated.places.lines
+        saltation = self.differentiated.saltation
+        watching = self.differentiated.touching + self.differentiated.places.lines
+        watching += len(saltation.moving) + len(saltation.leaving)
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):
             if first <= row < first + watching:

@@ -189,8 +189,10 @@ class StatePlaces:
     last = property(lambda self: self.together + 3)
     # when a guard and a condition were first met at one instant
     at_reset = property(lambda self: self.together + 4)
+    # of either sign, the other behind each reset
+    parity = property(lambda self: self.together + 5)
     # when each memory that is driven was first touched at its end, or hardly moved
-    touched = property(lambda self: self.together + 5)
+    touched = property(lambda self: self.together + 6)
     # when it first reversed at two corners at once
     cornered = property(lambda self: self.touched + self.driven)
     # where it stood before it was moved

@@ -239,8 +239,8 @@ class _Maker:
         """Whose the guards are: what jumps by a later one says more."""
         owner = self.source.extended.owner
         count = len(self.saltation.turning) + len(self.ends.guards)
-        turning = [owner + 1] if self.source.driven else []
-        watching = [owner] if self.sides.watches else []
+        turning = [owner + 1] * len(self.saltation.moving)
+        watching = [owner] * len(self.saltation.leaving)
         arriving = [owner + 3] * self.places.lines
         ours = [*[owner + 2] * count, *turning, *watching, *arriving]
         return (*ours, *self.source.program.guards)
@@ -347,8 +347,7 @@ class _Maker:
             if source.program.switching <= row < first and array.size
         ]
         rows = [*(apart for apart, _ in self.saltation.turning), *self.ends.guards]
-        rows += [self.sides.driven] if source.driven else []
-        rows += [self.sides.margin] if self.sides.watches else []
+        rows += [*self.saltation.moving, *self.saltation.leaving]
         rows += [*self.saltation.returning.guards, *source.guards]
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 

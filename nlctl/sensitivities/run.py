@@ -11,18 +11,17 @@ import control as ct
 import numpy as np
 
 from ..errors import CompileError, InexactWarning
-from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
 from ..native.driver import Course, begin, prepared, run_once
 from ..native.floats import with_floats
 from ..native.integrate.state import Status
-from ..native.jacobians import inexact, searches_of
+from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..responses.arguments import input_array, state_array
-from .directions import SomeRows
+from .beginning import Arrays, commits_at_start, evaluated_rows
 from .missing import missing
 from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
@@ -67,14 +66,14 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     scale = np.array([abs(v) or 1.0 for v in values])
     span = float(run.times[0]), float(run.times[-1])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
-    start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
+    start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
     reached = run_once(_course(differentiated, run, u), start, whole)
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
     full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
-    lacks = missing(differentiated, (compiled, full), reached, given, beginning)
+    lacks = missing(differentiated, (compiled, full), reached, given, commits)
     return _response(differentiated, (signals, quantities), (run.times, reached), scale, lacks)
 
 
@@ -133,8 +132,8 @@ def _start(
     run: RunWithDerivatives,
     given: tuple[np.ndarray, np.ndarray, np.ndarray],
     p: np.ndarray,
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the initial state, and what drives memories there, behind all that happens at once."""
+) -> tuple[np.ndarray, list[Arrays]]:
+    """Return the initial state behind all that happens at once, and the commits of memories."""
     (u, x0, scale), places = given, differentiated.places
     start = np.zeros(places.size)
     start[: places.states] = x0
@@ -145,21 +144,20 @@ def _start(
     start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
     sides, rated = differentiated.sides, differentiated.extended.sent >= Sent.RATES
     if not sides.rows and not differentiated.compiled.program.sampled and not rated:
-        return start, {}
+        return start, []
     arrays = _beginning(differentiated, run, u, start, p)
     if rated:  # what is sent first may be another than what was before
         layout, lines = differentiated.extended.layout, differentiated.extended.schedule.lines
         before = [p[layout[line.block or 0]["before"].offset] for line in lines[: places.lines]]
-        first = _values(differentiated, sides.source.arriving, arrays)
+        first = evaluated_rows(differentiated, sides.source.arriving, arrays)
         start[places.number : places.height] = 1.0
         start[places.height : places.moved] = before - first
-    start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
+    start[places.kept : places.together] = evaluated_rows(differentiated, sides.now, arrays)
     memories = [*sides.source.driven, *sides.source.catching]
-    arrays["x"][memories, 0] = x0[memories]  # from where they are moved
-    pieces = [(e, 1) for row in differentiated.saltation.at_start for e in row.values()]
+    commits = commits_at_start(differentiated, x0, arrays)
     rows = [places.derivative(j) + m for j in range(places.by) for m in memories]
-    start[rows] = _values(differentiated, pieces, arrays)
-    return start, arrays
+    start[rows] = commits[-1]["x"][rows, 0]
+    return start, commits
 
 
 def _course(differentiated: Differentiated, run: RunWithDerivatives, u: np.ndarray) -> Course:
@@ -174,7 +172,7 @@ def _beginning(
     u: np.ndarray,
     start: np.ndarray,
     p: np.ndarray,
-) -> dict[str, np.ndarray]:
+) -> Arrays:
     """Return what a run begins with, behind all that happens at once."""
     first = prepared(_course(differentiated, run, u), start[:, None], p[:, None])
     with np.errstate(all="ignore"):
@@ -183,17 +181,6 @@ def _beginning(
     arrays = {"t": work.t[None, :], "x": work.x, "u": work.u, "p": p[:, None]}
     arrays["t"] = np.maximum(arrays["t"][:, :1] * 0 + run.times[0], first.lanes["right"][:1])
     return arrays
-
-
-def _values(
-    differentiated: Differentiated, pieces: Sequence[SomeRows], arrays: dict[str, np.ndarray]
-) -> np.ndarray:
-    """Return the rows of some pieces."""
-    searches = searches_of(differentiated.compiled.equations)
-    values = evaluate_expressions([e for e, _ in pieces], arrays, searches)
-    parts = [np.broadcast_to(v.reshape(-1), (n,)) if v.size in (1, n) else v.reshape(-1)
-             for v, (_, n) in zip(values, pieces, strict=True)]  # fmt: skip
-    return np.concatenate([np.empty(0), *parts])
 
 
 def _audit(

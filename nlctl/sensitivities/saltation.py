@@ -146,6 +146,7 @@ class Saltation:
         after.append((self._lost_in_delay(self._any(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
         after.append((self._first(places.at_reset, together), 1))
+        after.append((graph.op("neg", graph.leaf("x", places.parity, None)), 1))
         brought = self._brought(before, when.moves)
         now = [line[0] for line in later]
         return [*after, *self.returning.sent(moves, earlier, now, when.moves, brought)]
@@ -273,9 +274,33 @@ class Saltation:
         }
 
     @cached_property
+    def leaving(self) -> list[Expr]:
+        """What falls below 0 where a side is left, if there are any."""
+        if not self.sides.watches:
+            return []
+        return self._alternating(self.sides.margin, bool(self.source.switched))
+
+    @cached_property
+    def moving(self) -> list[Expr]:
+        """What falls below 0 where a memory that is driven is not where it was, if any is."""
+        driven = bool(self.source.driven)
+        return self._alternating(self.sides.driven, driven) if driven else []
+
+    def _alternating(self, guard: Expr, by_resets: bool) -> list[Expr]:
+        """Return a guard that a reset may leave below 0, or two that watch in turn if it may."""
+        # A guard falls again only when it has risen.  As a block resets, one may fall by what has
+        # moved a memory until then, and the reset moves that at once: there the other falls.
+        if not (by_resets and self.source.guards):
+            return [guard]
+        graph, one = self.source.graph, self.source.graph.const(1.0)
+        odd = graph.op("lt", graph.leaf("x", self.places.parity, None), graph.const(0.0))
+        return [graph.op("select", odd, one, guard), graph.op("select", odd, guard, one)]
+
+    @cached_property
     def at_start(self) -> list[dict[int, Expr]]:
         """By quantity the derivatives of memories that a run begins by driving, by their states."""
-        become = self.source.driven | self.source.catching
+        committed = dict(zip(self.source.program.memory, self.source.committed, strict=True))
+        become = {m: committed[m] for m in (*self.source.driven, *self.source.catching)}
         rows = [self.source.changes(list(become.values()), seed) for seed in self.seeds]
         return [dict(zip(become, changes, strict=True)) for changes in rows]
 

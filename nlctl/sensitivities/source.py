@@ -171,10 +171,9 @@ class EquationParts:
         names = [name for name in self.equations.results if name.startswith("sample")]
         return self._levels(conditions(e for name in names for e, _ in self.equations.pieces(name)))
 
-    @cached_property
-    def edges(self) -> list[Expr]:
-        """Levels of what memories are driven by."""
-        return self._levels(conditions(self.driven.values()))
+    def edges(self, memories: Sequence[int]) -> list[Expr]:
+        """Return levels of what some memories are driven by."""
+        return self._levels(conditions([self.driven[m] for m in memories]))
 
     def _levels(self, of: Iterable[Expr]) -> list[Expr]:
         return [switching_function(self.graph, condition) for condition in of]
