@@ -280,6 +280,7 @@ def test_the_short_way_to_a_band_over_one_window_is_exact(samples, window):
         assert extremes(t, y, low, high) == (np.min(expected), np.max(expected))
 
 
+@pytest.mark.weekly
 def test_machine_code_of_the_usual_metrics_agrees_with_python():
     """To the rounding of sums."""
     t = np.linspace(0, 20, 1001)
