@@ -29,6 +29,7 @@ class DrivenMemories:
     places: StatePlaces
     seeds: Sequence[Direction]
     _known_corners: dict[Expr, list[Corner]] = field(default_factory=dict)
+    _at_corners: dict[Expr, tuple[Expr, list[Expr]]] = field(default_factory=dict)
 
     def kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
         """Return the derivative of a memory, which is integrated only while it is not driven."""
@@ -47,23 +48,31 @@ class DrivenMemories:
         # A step ends a little behind that.
         source, graph = self.source, self.source.graph
         derivative = change = self._change(level, j)
-        forward = source.time(source.flowing(source.flow, self.seeds), delays_move=False)
         recent, late = self._late(level)
-        (rate,) = source.slopes([change], forward)
+        (rate,) = source.slopes([change], self._forward)
         if rate is not None:
             late = graph.op("select", recent, late, graph.const(0.0))
             derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
         if self._is_moved_by_delay(j, level):
             # a break of an input, whose time moves behind the delay as that does
             scale = graph.leaf("p", source.extended.slot("scale").offset + j, None)
-            (rate,) = source.changes([level], forward)
+            (rate,) = source.changes([level], self._forward)
             moved = graph.op("add", derivative, graph.op("mul", scale, rate))
             derivative = graph.op("select", recent, derivative, moved)
         corners = self.corners(level)
         if corners:
-            here, there = at_corner(source, level, corners, self.seeds)
+            if level not in self._at_corners:
+                self._at_corners[level] = at_corner(source, level, corners, self.seeds)
+            here, there = self._at_corners[level]
             derivative = graph.op("select", here, there[j], derivative)
         return derivative
+
+    @cached_property
+    def _forward(self) -> Direction:
+        """The direction in which everything goes, derivatives too."""
+        return self.source.time(
+            self.source.flowing(self.source.flow, self.seeds), delays_move=False
+        )
 
     def _is_kept(self, m: int, before: Expr) -> Expr:
         """Return whether a memory is where it was driven to before a clock has ticked."""

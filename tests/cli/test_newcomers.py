@@ -28,6 +28,7 @@ def text_of(page):
     return re.sub(r"\s+", " ", re.sub("<[^>]*>", " ", page.read_text(encoding="utf-8")))
 
 
+@pytest.mark.weekly
 def test_the_commands_of_the_guide_run_one_after_the_other(tmp_path):
     """From nothing to a loop, its picture, its page, a study, and a test that passes."""
     (block,) = re.findall(r"```console\n(.*?)```", START, flags=re.DOTALL)
