@@ -83,6 +83,8 @@ def _step(graph: Graph, number: Expr, level: Expr) -> tuple[AtLevel, bool] | Non
     if not number.varies or level.varies:
         return None
     args = [graph.number(arg) for arg in number.args]
+    if number.op in ("sqrt", "hypot") and level.op == "const" and not level.data >= 0.0:
+        return None  # it never is
     if number.op == "sqrt":
         return AtLevel(args[0], graph.op("mul", level, level)), False
     if number.op == "hypot":

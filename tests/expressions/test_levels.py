@@ -100,6 +100,19 @@ def test_a_square_rises_and_falls_where_it_does(engine):
     assert list(ways["direction"]) == ["falling", "rising", "falling", "rising"]
 
 
+@pytest.mark.parametrize("engine", ["native", "python-control"])
+def test_a_root_is_never_at_a_level_below_zero(engine):
+    """Nothing switches where the square of the root is that of the level."""
+    ramp = ct.nlsys(
+        lambda t, x, u, params: [1.0, np.where(np.hypot(x[0], 0.5) > -1.0, 1.0, 0.0)
+                                 + np.where(np.sqrt(x[0] + 0.1) > -0.7, 1.0, 0.0)],
+        None, states=["x", "y"], inputs=0, name="ramp",
+    )  # fmt: skip
+    run = nlctl.input_output_response(ramp, [0, 3], 0, [0.0, 0.0], engine=engine)
+    assert len(run.events) == 0
+    assert run.states[1, -1] == pytest.approx(6.0)
+
+
 @pytest.mark.parametrize("radius", [-0.5, 0.0])
 def test_a_square_is_never_below_what_is_not_above_zero(radius):
     system = ct.nlsys(
