@@ -82,7 +82,7 @@ class MemoryEnds:
         corners = [corner.here for corner in self.turns.corners(number)]
         if reads([number], "u", self.source.delayed) and self.when.returning.arrives is not None:
             corners.append(self.when.returning.arrives)
-        return reduce(partial(self.graph.op, "or"), corners) if corners else None
+        return self.source.any_of(corners) if corners else None
 
     def _stands_at(self, m: int, gap: Expr) -> Expr | None:
         """Return whether a memory stands right at an end at a corner, None if there is none."""
@@ -132,13 +132,8 @@ class MemoryEnds:
         no, apart, when = self.graph.const(False), self.turns.corners_apart, []
         for k, m in enumerate(self.source.driven):
             here = self.graph.op("and", self.turns.has_turned(m), apart.get(m, no))
-            when.append(self._first(self.graph.leaf("x", self.places.cornered + k, None), here))
+            when.append(self.source.first_time(self.places.cornered + k, here))
         return when
-
-    def _first(self, before: Expr, happens: Expr) -> Expr:
-        """Return when something has first happened, now at the latest if it does."""
-        earlier = self.graph.op("minimum", before, self.graph.leaf("t", 0, None))
-        return self.graph.op("select", happens, earlier, before)
 
     @cached_property
     def _stood(self) -> dict[int, Expr]:
@@ -164,8 +159,7 @@ class MemoryEnds:
     def when_touched(self) -> list[Expr]:
         """When each memory was first touched."""
         places = enumerate(self.source.driven, self.places.touched)
-        leaves = ((self.graph.leaf("x", place, None), m) for place, m in places)
-        return [self._first(before, self._touched[m]) for before, m in leaves]
+        return [self.source.first_time(place, self._touched[m]) for place, m in places]
 
     @property
     def at_turns(self) -> list[Expr]:
@@ -183,8 +177,7 @@ class MemoryEnds:
         """Return whether a time is no longer ago than a step may end behind a turn."""
         graph = self.graph
         ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), time))
-        late = graph.leaf("p", self.source.extended.slot("late").offset, None)
-        return graph.op("le", ago, late)
+        return graph.op("le", ago, self.source.setting("late"))
 
     def _derivative(self, j: int, m: int) -> Expr:
         return self.graph.leaf("x", self.places.derivative(j) + m, None)
@@ -202,14 +195,14 @@ class MemoryEnds:
 
     def _any_differs(self, pairs: Sequence[tuple[Expr, Expr]]) -> Expr:
         """Return whether any two derivatives are not one."""
-        graph, differs = self.graph, self.graph.const(False)
+        graph, differ = self.graph, []
         for one, other in pairs:
             gap = graph.op("absolute", graph.op("sub", one, other))
             size = graph.op("add", graph.op("absolute", one), graph.op("absolute", other))
             seen = graph.op("mul", graph.const(_SEEN), self.when.noise(size))
             least = graph.op("add", graph.op("mul", graph.const(_AGREE), size), seen)
-            differs = graph.op("or", differs, graph.op("gt", gap, least))
-        return differs
+            differ.append(graph.op("gt", gap, least))
+        return self.source.any_of(differ)
 
     def _noise(self, m: int) -> Expr:
         return self.when.noise(self.graph.op("absolute", self.source.driven[m]))

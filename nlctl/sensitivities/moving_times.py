@@ -112,6 +112,6 @@ class TimesThatMove:
 
     def noise(self, extent: Expr) -> Expr:
         """Return how well a number of some size is known."""
-        graph, slot = self.source.graph, self.source.extended.slot
-        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
+        graph = self.source.graph
+        rtol, atol = map(self.source.setting, ("rtol", "atol"))
         return graph.op("add", graph.op("mul", rtol, extent), atol)

@@ -165,7 +165,7 @@ def _seed(
 ) -> Direction:
     """Return the direction in which everything goes by a quantity."""
     graph, extended_program = source.graph, source.extended
-    scale = graph.leaf("p", extended_program.slot("scale").offset + j, None)
+    scale = source.setting("scale", j)
 
     def of_states(start: int, step: int, size: int | None) -> Expr | None:
         if start >= places.states:

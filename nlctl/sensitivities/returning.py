@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph
@@ -47,7 +47,7 @@ class Returning:
     @property
     def rounding(self) -> Expr:
         """How close break points of t are that are passed at once."""
-        return self.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
+        return self.source.setting("rounding")
 
     @cached_property
     def when(self) -> When:
@@ -58,7 +58,7 @@ class Returning:
     def arrives(self) -> Expr | None:
         """Whether a jump leaves any line now, None if there are none."""
         every = [self._arrived(i) for i in range(self.places.lines)]
-        return reduce(lambda a, b: self.graph.op("or", a, b), every) if every else None
+        return self.source.any_of(every) if every else None
 
     @property
     def causes(self) -> list[Cause]:
@@ -87,8 +87,7 @@ class Returning:
         sent = self._leaving(self.places.by + 2 + j, i)
         if not self.places.delays[j][i]:
             return sent
-        scale = self.graph.leaf("p", self.source.extended.slot("scale").offset + j, None)
-        return self.graph.op("add", sent, scale)
+        return self.graph.op("add", sent, self.source.setting("scale", j))
 
     def counts(self, when: When, sent: Sequence[Expr]) -> list[Expr]:
         """Return whether what is sent through each line jumps, at a time that moves."""
@@ -100,7 +99,7 @@ class Returning:
         """Return whether a corner that has left a delay arrives at a line at once."""
         lines = range(self.places.lines if self.places.turns else 0)
         arrived = [self._arrived(k) for k in lines if self.source.extended.direct[i, k]]
-        return reduce(lambda a, b: self.graph.op("or", a, b), arrived, self.graph.const(False))
+        return self.source.any_of(arrived)
 
     def sent(
         self,
@@ -120,7 +119,7 @@ class Returning:
         numbers = [graph.op("add", number, graph.const(1.0)) for number in numbers]
         heights = [graph.op("sub", a, b) for a, b in zip(earlier, now, strict=True)]
         rest = [e for j in range(places.by) for e in brought(j, earlier)] if places.turns else []
-        any_happens = reduce(lambda a, b: graph.op("or", a, b), happens)
+        any_happens = self.source.any_of(happens)
         new = [*zip(happens, numbers, strict=True), *zip(happens, heights, strict=True)]
         new += [(any_happens, move) for move in moves]
         new += [(happens[k % places.lines], e) for k, e in enumerate(rest)]
@@ -197,6 +196,5 @@ class Returning:
     @property
     def several(self) -> Expr:
         """Whether more than one jump leaves a line now, of which only the last is known."""
-        graph, lines = self.graph, range(self.places.lines)
-        several = [self._arrived(i, 1.0 + _ANOTHER) for i in lines]
-        return reduce(lambda a, b: graph.op("or", a, b), several, graph.const(False))
+        lines = range(self.places.lines)
+        return self.source.any_of([self._arrived(i, 1.0 + _ANOTHER) for i in lines])

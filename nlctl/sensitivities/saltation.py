@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial, reduce
+from functools import cached_property
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
@@ -53,7 +53,7 @@ class Saltation:
         sent = self._sent(self._seen(arriving, before), self._seen(source.single_arriving, behind))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
-        when = self.when.left(reduce(partial(graph.op, "or"), [jumps, *sent, *switches]))
+        when = self.when.left(source.any_of([jumps, *sent, *switches]))
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
@@ -67,7 +67,7 @@ class Saltation:
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         moves = self.returning.counts(when, sent)
-        happens = [(e, 1) for e in (when.apart, when.grazes, self._any(moves))]
+        happens = [(e, 1) for e in (when.apart, when.grazes, self.source.any_of(moves))]
         brought = self._brought(before, when.moves)
         sent_rows = self.returning.sent(
             moves, arriving, source.single_arriving, when.moves, brought
@@ -75,15 +75,10 @@ class Saltation:
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
         rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
         sent_rows = behind_all[len(rows) + 3 :]
-        rows.append((self._first(places.together, apart[0]), 1))
-        rows.append((self._first(places.grazing, grazes[0]), 1))
+        rows.append((self.source.first_time(places.together, apart[0]), 1))
+        rows.append((self.source.first_time(places.grazing, grazes[0]), 1))
         rows.append((self._lost_in_delay(jumped[0]), 1))
         return [*rows, *sent_rows]
-
-    def _any(self, conditions: Sequence[Expr]) -> Expr:
-        """Return whether any of some conditions holds."""
-        graph = self.source.graph
-        return reduce(partial(graph.op, "or"), conditions, graph.const(False))
 
     def _seen(self, arriving: Sequence[Expr], flow: Sequence[SomeRows]) -> list[list[Expr]]:
         """Return what may jump of what arrives at each delay: rates, too, if memories follow it."""
@@ -100,7 +95,9 @@ class Saltation:
         pairs = [
             zip(a, [(e, 1) for e in b], strict=True) for a, b in zip(earlier, now, strict=True)
         ]
-        return [self._any([self._differ([pair], unseen) for pair in line]) for line in pairs]
+        return [
+            self.source.any_of([self._differ([pair], unseen) for pair in line]) for line in pairs
+        ]
 
     def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
         """Return numbers as they are behind all break points of t that are passed at once."""
@@ -129,8 +126,7 @@ class Saltation:
         later = [[e for e, _ in self._after(rows, [(e, 1) for e in line])] for line in lines]
         earlier = self._earlier(source.single_arriving)
         # what is reset to where it has fallen has moved by as little as a step ends behind that
-        atol = graph.leaf("p", source.extended.slot("atol").offset, None)
-        unseen = graph.op("mul", graph.const(_UNSEEN), atol)
+        unseen = graph.op("mul", graph.const(_UNSEEN), source.setting("atol"))
         sent = self._sent(self._seen(earlier, before), later, unseen)
         when, together = self.when.reset(guards)
         broken, after = graph.op("or", when.grazes, together), []
@@ -141,11 +137,11 @@ class Saltation:
         for m, kept in self.sides.memories.items():
             (stands,) = self.sides.kept([rows.get(m, kept)])
             after.append((graph.leaf("x", m, None) if m in source.switched else stands, 1))
-        after.append((self._first(places.grazing, when.grazes), 1))
+        after.append((self.source.first_time(places.grazing, when.grazes), 1))
         moves = self.returning.counts(when, sent)
-        after.append((self._lost_in_delay(self._any(moves)), 1))
+        after.append((self._lost_in_delay(self.source.any_of(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
-        after.append((self._first(places.at_reset, together), 1))
+        after.append((self.source.first_time(places.at_reset, together), 1))
         after.append((graph.op("neg", graph.leaf("x", places.parity, None)), 1))
         brought = self._brought(before, when.moves)
         now = [line[0] for line in later]
@@ -180,7 +176,7 @@ class Saltation:
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
         together = graph.op("or", when.apart, returning.several)
-        rows.append((self._first(self.places.together, together), 1))
+        rows.append((self.source.first_time(self.places.together, together), 1))
         arriving = self._earlier(source.single_arriving)
         sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
         sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
@@ -204,7 +200,7 @@ class Saltation:
     def _lost_in_delay(self, moves: Expr) -> Expr:
         """Return when a jump whose time moves was first sent through delays that do not keep it."""
         never = self.source.graph.const(False)
-        return self._first(self.places.jumped, never if self.places.lines else moves)
+        return self.source.first_time(self.places.jumped, never if self.places.lines else moves)
 
     @cached_property
     def when(self) -> TimesThatMove:
@@ -252,10 +248,8 @@ class Saltation:
 
     def at_touch(self) -> Expr:
         """Return when a condition was first touched, where a level has reversed."""
-        graph, touched = self.source.graph, self.source.graph.const(False)
-        for _, touch in self.turning:
-            touched = graph.op("or", touched, touch)
-        return self._first(self.places.grazing, touched)
+        touched = self.source.any_of([touch for _, touch in self.turning])
+        return self.source.first_time(self.places.grazing, touched)
 
     @cached_property
     def turns(self) -> DrivenMemories:
@@ -463,12 +457,6 @@ class Saltation:
             extent = graph.op("add", extent, graph.op("add", *parts[1:]))
         least = graph.op("mul", graph.const(_NOTICED), extent)
         return graph.op("gt", apart, least if unseen is None else graph.op("add", least, unseen))
-
-    def _first(self, place: int, happens: Expr) -> Expr:
-        """Return when something has first happened, now at the latest if it does."""
-        graph = self.source.graph
-        earlier, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
-        return graph.op("select", happens, graph.op("minimum", earlier, now), earlier)
 
 
 def _sum(graph: Graph, one: Taken, other: Taken) -> Taken:

@@ -196,7 +196,7 @@ def with_derivatives(
     compiled: Compiled, extended_program: Extended, states: int, outputs: int, by: int
 ) -> Schedule:
     """Return the schedule of the program: what arrives, and what leaves which line at once."""
-    direct, lines = direct_lines(compiled.schedule), extended_program.schedule.lines
+    direct, lines = extended_program.direct, extended_program.schedule.lines
     arriving = []
     signals = set(range(extended_program.lines)) if extended_program.sent else set()
     for j in range(-1, extended_program.groups):

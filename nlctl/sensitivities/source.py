@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial, reduce
 
 import numpy as np
 
@@ -59,6 +59,20 @@ class EquationParts:
     def graph(self) -> Graph:
         """Where the expressions are kept."""
         return self.equations.graph
+
+    def setting(self, name: str, k: int = 0) -> Expr:
+        """Return a number that a run with derivatives is given, of several the k-th."""
+        return self.graph.leaf("p", self.extended.slot(name).offset + k, None)
+
+    def any_of(self, happen: Sequence[Expr]) -> Expr:
+        """Return whether any of some things happens."""
+        never = self.graph.const(False)
+        return reduce(partial(self.graph.op, "or"), happen) if happen else never
+
+    def first_time(self, place: int, happens: Expr) -> Expr:
+        """Return when something has first happened, by its state; now at the latest if it does."""
+        before, now = self.graph.leaf("x", place, None), self.graph.leaf("t", 0, None)
+        return self.graph.op("select", happens, self.graph.op("minimum", before, now), before)
 
     @property
     def driven(self) -> dict[int, Expr]:

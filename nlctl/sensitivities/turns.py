@@ -55,7 +55,7 @@ class DrivenMemories:
             derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
         if self._is_moved_by_delay(j, level):
             # a break of an input, whose time moves behind the delay as that does
-            scale = graph.leaf("p", source.extended.slot("scale").offset + j, None)
+            scale = source.setting("scale", j)
             (rate,) = source.changes([level], self._forward)
             moved = graph.op("add", derivative, graph.op("mul", scale, rate))
             derivative = graph.op("select", recent, derivative, moved)
@@ -104,8 +104,7 @@ class DrivenMemories:
         kept = graph.op("select", self._is_kept(m, before), change, self._change(after, j))
         ticked = graph.leaf("x", places.ticked, None)
         gap = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), ticked))
-        rounding = graph.leaf("p", self.source.extended.slot("rounding").offset, None)
-        here = graph.op("le", gap, rounding)
+        here = graph.op("le", gap, self.source.setting("rounding"))
         return graph.op("select", here, kept, turned)
 
     def _change(self, level: Expr, j: int) -> Expr:
@@ -131,8 +130,8 @@ class DrivenMemories:
     @cached_property
     def corners_apart(self) -> dict[int, Expr]:
         """Whether memories are driven by two corners now, each of which moves otherwise."""
-        graph, slot = self.source.graph, self.source.extended.slot("rounding")
-        rounding, no, apart = graph.leaf("p", slot.offset, None), graph.const(False), {}
+        graph, rounding = self.source.graph, self.source.setting("rounding")
+        no, apart = graph.const(False), {}
         for m, become in self.source.driven.items():
             causes = [Cause(met=c.here, moves=c.moves, grazes=no) for c in self.corners(become)]
             if len(causes) > 1:
@@ -142,14 +141,9 @@ class DrivenMemories:
     def corners(self, level: Expr) -> list[Corner]:
         """Return the corners of a number."""
         if level not in self._known_corners:
-            corners = corners_of(self.source, level, self.seeds, self._longest)
+            corners = corners_of(self.source, level, self.seeds, self.source.setting("late"))
             self._known_corners[level] = corners
         return self._known_corners[level]
-
-    @property
-    def _longest(self) -> Expr:
-        """How late a turn may be seen."""
-        return self.source.graph.leaf("p", self.source.extended.slot("late").offset, None)
 
     def _is_moved_by_delay(self, j: int, become: Expr) -> bool:
         """Whether breaks of inputs that drive a memory move as a quantity, a delay, does."""
@@ -179,4 +173,4 @@ class DrivenMemories:
         (rate,) = self.source.slopes([become], forward)
         (bend,) = self.source.slopes([rate or zero], forward)
         late = graph.op("div", rate or zero, bend or zero)
-        return graph.op("le", graph.op("absolute", late), self._longest), late
+        return graph.op("le", graph.op("absolute", late), self.source.setting("late")), late

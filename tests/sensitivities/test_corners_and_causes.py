@@ -3,7 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
-from closed_form_runs import CORNERS, A, P, R, integral, source
+from closed_form_runs import CORNERS, A, P, R, Tank, integral, source
 
 import nlctl
 
@@ -53,36 +53,6 @@ def test_what_switches_as_its_input_jumps(actuator, kind):
     assert made["y", "source.h"] == pytest.approx([0, 0, 0], abs=1e-8)
     by_rate = 0.0 if rate is None else 2 * P / R**2
     assert made["y", "source.R"] == pytest.approx([0, 0, by_rate], abs=1e-6)
-
-
-@nlctl.record
-class Tank:
-    """Fills at a rate, and is emptied to a where it reaches a level."""
-
-    a: float = nlctl.param(0.05, unit="1", meaning="level behind")
-    q: float = nlctl.param(1.0, unit="1/s", meaning="rate")
-
-    inputs, outputs, states, feedthrough = ("level",), ("h",), ("h",), False
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (p.q,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def guard(t, x, u, p):
-        return (u[0] - x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def reset(t, x, u, p):
-        return (p.a,)
 
 
 def level(output, inputs, params):

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from closed_form_runs import Tank
 
 import nlctl
 
@@ -170,33 +171,17 @@ def test_play_that_turns_between_samples_at_events(method):
 
 
 @nlctl.record
-class Tank:
-    """Fills at a rate, and is emptied to a where its trigger falls."""
+class TriggeredTank(Tank):
+    """It is emptied where its trigger falls, whatever stands in it."""
 
     a: float = nlctl.param(-1.0, unit="1", meaning="level behind")
-    q: float = nlctl.param(1.0, unit="1/s", meaning="rate")
 
-    inputs, outputs, states, feedthrough = ("trigger",), ("h",), ("h",), False
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (p.q,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
+    inputs = ("trigger",)
 
     @staticmethod
     @nlctl.equation
     def guard(t, x, u, p):
         return (u[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def reset(t, x, u, p):
-        return (p.a,)
 
 
 @pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
@@ -207,7 +192,7 @@ def test_relay_whose_switching_empties_the_tank_that_switches_it_back(method):
         None, lambda t, x, u, p: [-u[0]], inputs=["r"], outputs=["trigger"], name="rule"
     )
     loop = ct.interconnect(
-        [nlctl.block(Tank(), "tank"), relay, rule], inputs=[], outputs=["h"], name="loop"
+        [nlctl.block(TriggeredTank(), "tank"), relay, rule], inputs=[], outputs=["h"], name="loop"
     )
     times, start = np.array([0.0, 0.3, 1.5, 3.0, 4.5, 6.0]), 0.1
     by = ["tank.a", "tank.q", "relay.on", "relay.off", "tank.h(0)"]

@@ -96,3 +96,33 @@ CORNERS = {
     "root": lambda t, x, u, p: [p["A"] - np.sqrt((x[0] - p["P"]) ** 2)],
     "remainder": lambda t, x, u, p: [p["A"] - np.abs(np.mod(x[0] - p["P"] + 2, 4) - 2)],
 }  # fmt: skip
+
+
+@nlctl.record
+class Tank:
+    """Fills at a rate, and is emptied to a where it reaches a level."""
+
+    a: float = nlctl.param(0.05, unit="1", meaning="level behind")
+    q: float = nlctl.param(1.0, unit="1/s", meaning="rate")
+
+    inputs, outputs, states, feedthrough = ("level",), ("h",), ("h",), False
+
+    @staticmethod
+    @nlctl.equation
+    def update(t, x, u, p):
+        return (p.q,)
+
+    @staticmethod
+    @nlctl.equation
+    def output(t, x, u, p):
+        return (x[0],)
+
+    @staticmethod
+    @nlctl.equation
+    def guard(t, x, u, p):
+        return (u[0] - x[0],)
+
+    @staticmethod
+    @nlctl.equation
+    def reset(t, x, u, p):
+        return (p.a,)
