@@ -86,8 +86,8 @@ def element_index(name: str, shape: Sequence[int]) -> tuple[int, ...]:
             raise ParameterError(f"'{base}' is one number, of which '{name}' is not an element")
         example = element_name(base, [0] * len(shape))
         raise ParameterError(
-            f"'{name}' is not one number of '{base}', whose shape is {tuple(shape)}: name one, "
-            f"such as '{example}'"
+            f"'{name}' is not one number: name one, such as '{example}' (the shape of '{base}' is "
+            f"{tuple(shape)})"
         )
     return index
 
@@ -232,7 +232,7 @@ class Parameters(dict[str, Any]):
         self.table = outer
         prefix = self.prefix
         for key in list(self):
-            if "[" in key and key != base_name(key) and prefix + base_name(key) in outer:
+            if is_element(key) and prefix + base_name(key) in outer:
                 del self[key]  # an element's default gives way to what the outside says
         for key in [k for k in self if "." in prefix + k and self._means_one(prefix + k, outer)]:
             dict.__setitem__(self, key, outer[prefix + key])

@@ -419,9 +419,15 @@ def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
 def _replace_element(spec: Any, key: str, value: object) -> Any:
     name, number = base_name(key), as_numbers(value)
     array = np.array(getattr(spec, name), dtype=float)
-    index = element_index(key, array.shape)
-    if number is None or number.ndim:
-        raise ParameterError(f"{type(spec).__name__} needs a number for {key}, got {value!r}")
+    try:
+        index = element_index(key, array.shape)
+        if number is None or number.ndim:
+            raise ParameterError(f"'{key}' needs a number")
+    except ParameterError:
+        raise ParameterError(
+            f"{type(spec).__name__} has {name} of shape {array.shape}; "
+            f"'{key}' = {value!r} is not an element of it"
+        ) from None
     array[index] = number
     return dataclasses.replace(spec, **{name: array})
 

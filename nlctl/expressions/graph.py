@@ -143,6 +143,8 @@ class MessageWritten(Untraceable):
 class Graph:
     """All expressions of a diagram."""
 
+    nothing_fails = True  # whether a way that returns nothing is one that raises an error
+
     def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
         self.settles = False  # whether conditions of parameters that are integers are decided

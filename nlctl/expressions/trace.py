@@ -212,7 +212,8 @@ def _guarded(graph: Graph, result: Tracer) -> Tracer:
 
 def _flat(graph: Graph, value: object) -> Tracer:
     """Return a function's result, an array, tuple, list or number, in one dimension."""
-    if value is None and graph.decisions:  # what no case is for; python-control raises an error
+    # what no case is for: python-control raises an error
+    if value is None and graph.decisions and graph.nothing_fails:
         raise catchable(TypeError)
     if isinstance(value, tuple | list):
         return concatenated(graph, [traced(graph, v).there().reshape(-1) for v in value])

@@ -249,11 +249,7 @@ class TestOverrides:
     )
     def test_a_bad_index_is_refused(self, key):
         """An element that does not exist, or is not written as one, names parameter and block."""
-        base = key.partition("[")[0]
-        words = (
-            rf"('{re.escape(key)}' is not one number of '{base}'|'{base}' is one).*\(block 'b'\)"
-        )
-        with pytest.raises(ParameterError, match=words):
+        with pytest.raises(ParameterError, match=rf"Mixed has {key[0]}.*\(block 'b'\)"):
             with_overrides(Mixed(), {key: 1.0}, "b")
 
     @each_row("value", [np.nan, -1.0, (1.0, 2.0), "text"])

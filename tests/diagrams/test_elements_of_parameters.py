@@ -43,7 +43,9 @@ def test_an_element_is_set_and_no_other(row, column, value, spelling, kind):
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 def test_what_is_no_element_is_refused(index, engine):
     """A row is not a number, and what cannot be read is nothing."""
-    with pytest.raises(ParameterError, match=r"not one number of 'plant\.W', whose shape is"):
+    with pytest.raises(
+        ParameterError, match=r"not one number: name one, such as 'plant\.W\[0, 0\]'"
+    ):
         nlctl.input_output_response(
             weighted(), TIMES, 0, [1.0, 1.0], params={f"plant.W{index}": 9.0}, engine=engine
         )

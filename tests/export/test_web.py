@@ -382,7 +382,7 @@ def test_a_few_are_chosen_where_none_is_named():
 
 
 NOT_MOVED = {
-    "reference.amplitudes": "is not one number of 'reference.amplitudes', whose shape",
+    "reference.amplitudes": "is not one number: name one, such as 'reference.amplitudes[0]'",
     "reference.order": "is an integer or a choice",
     "controller.law.beta=-1:1": "NussbaumLaw needs beta > 0",
     "controller.law.beta=1": "a range is LOW:HIGH",

@@ -165,7 +165,7 @@ class TestNames:
             change(diagram)
             return out(diagram)
 
-        with pytest.raises((UnknownNameError, ParameterError), match=r"first\.k|'k' is one number"):
+        with pytest.raises((UnknownNameError, ParameterError), match=r"first\.k|Affine has k"):
             use()
 
     @makers
