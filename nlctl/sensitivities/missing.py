@@ -132,14 +132,11 @@ class _Run:
         later: dict[str, np.ndarray] | None = None,
     ) -> list[NoDerivative]:
         """Return by what there is none from when on: a level is 0, and later, and moves there."""
+        met = self._zeros([(level, np.array(True)) for level in levels], at)
+        met = self._zeros(met, later) if later and met else met
+        if not met:
+            return []
         later, zero, lacks = later or at, self.differentiated.sides.source.graph.const(0.0), []
-        met = [
-            (level, (now == 0.0) & (then == 0.0))
-            for level, now, then in zip(
-                levels, self._values(levels, at), self._values(levels, later), strict=True
-            )
-            if np.any((now == 0.0) & (then == 0.0))
-        ]
         changes = [self._changes([level for level, _ in met], j) for j in range(len(self.names))]
         moves = self._values([change or zero for row in changes for change in row], later)
         for j, name in enumerate(self.names):
@@ -157,6 +154,17 @@ class _Run:
                 with_respect_to=tuple(name for other, name in lacks if other == time),
             ) for time in sorted({time for time, _ in lacks})
         ]  # fmt: skip
+
+    def _zeros(
+        self, levels: list[tuple[Expr, np.ndarray]], at: dict[str, np.ndarray]
+    ) -> list[tuple[Expr, np.ndarray]]:
+        """Return which levels are 0 somewhere, and where: there as well, if it was so before."""
+        values = self._values([level for level, _ in levels], at)
+        zeros = [
+            (level, before & (value == 0.0))
+            for (level, before), value in zip(levels, values, strict=True)
+        ]
+        return [(level, zero) for level, zero in zeros if np.any(zero)]
 
     def _changes(self, levels: list[Expr], j: int) -> list[Expr | None]:
         """Return the derivatives of levels by a quantity, derived where they are first met."""

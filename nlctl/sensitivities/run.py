@@ -20,6 +20,7 @@ from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
+from ..native.spare import give_back
 from ..responses.arguments import input_array, state_array
 from .beginning import Arrays, commits_at_start, evaluated_rows
 from .missing import missing
@@ -178,8 +179,10 @@ def _beginning(
     with np.errstate(all="ignore"):
         begin(first)
     work = first.work
-    arrays = {"t": work.t[None, :], "x": work.x, "u": work.u, "p": p[:, None]}
-    arrays["t"] = np.maximum(arrays["t"][:, :1] * 0 + run.times[0], first.lanes["right"][:1])
+    time = np.maximum(first.lanes["right"][None, :1], run.times[0])
+    arrays = {"t": time, "x": work.x.copy(), "u": work.u.copy(), "p": p[:, None]}
+    if first.spare is not None:
+        give_back(differentiated.compiled.cache, first.spare)
     return arrays
 
 

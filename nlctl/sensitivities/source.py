@@ -187,7 +187,12 @@ class EquationParts:
 
     def edges(self, memories: Sequence[int]) -> list[Expr]:
         """Return levels of what some memories are driven by."""
-        return self._levels(conditions([self.driven[m] for m in memories]))
+        return [level for m in memories for level in self._edges[m]]
+
+    @cached_property
+    def _edges(self) -> dict[int, list[Expr]]:
+        """Levels of what each memory is driven by."""
+        return {m: self._levels(conditions([become])) for m, become in self.driven.items()}
 
     def _levels(self, of: Iterable[Expr]) -> list[Expr]:
         return [switching_function(self.graph, condition) for condition in of]

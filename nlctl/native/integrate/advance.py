@@ -70,7 +70,7 @@ def _judge(task, lanes, w, found):
                 lane.rejected += 1
             if found[j] == AGAIN or found[j] == REFUSED or (lane.across and found[j] != NOTHING):
                 continue
-        if rejected(lane, w.error[j], task):
+        if rejected(lane, w.error[j], task, taylor.least_part(task, w, j)):
             found[j], lane.returns = REFUSED, 0
             continue
         found[j] = CLEAR
@@ -165,9 +165,11 @@ def _began_to_move(w, j):
 
 
 @numba.njit(**INNER)
-def _take(task, w, done):
+def _take(task, lanes, w, done, passed):
     """Make the ends of the accepted steps the states, and commit the memories."""
+    # Return whether one has moved without an event: there what is compared with it is another.
     x, k, events, rows, last = w.x, w.k, w.events, task.rows, w.k.shape[0] - 1
+    moved = False
     for j in range(done.size):
         if not done[j]:
             continue
@@ -188,7 +190,10 @@ def _take(task, w, done):
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
+                if lanes[j].quiet == 0:
+                    passed[j] = moved = True
         begin_next(task, w, j)
+    return moved
 
 
 @numba.njit(**INNER)
@@ -280,7 +285,7 @@ def advance(rhs, point, along, task, w, rounds):
             look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
-        _take(task, w, done)
+        any_passed |= _take(task, lanes, w, done, passed)
         _see(task, lanes, w)
         _jump(rhs, task, lanes, w, done, passed, sampled, any_passed)
         if rows.ways.size:
@@ -364,7 +369,9 @@ def _note_events(task, lanes, w, found, done):
         for i in range(rows.guarded, rows.switching):
             if w.guards.above[i - rows.guarded, j] != 0 and events.g[i, j] < 0.0:
                 turns = 0
-        lanes[j].turns += turns
+        if turns and not (lanes[j].at_once > 0.0 and lanes[j].begun == lanes[j].turned_at):
+            lanes[j].turns += 1  # located in one step
+        lanes[j].turned_at = lanes[j].t if turns else np.nan
 
 
 @numba.njit(**INNER)

@@ -17,6 +17,7 @@ SMALLEST = 4e-16  # of the time: no shorter step can be told from none
 TRIAL = 20  # steps of the stiff method before it is judged
 MAX_PATIENCE = 2000
 _TO_STOP = 1.01  # times a step: a stop so close ends it
+LEAST = 0.2  # part of a step that is tried next if its error is too large
 _NOTICED = 0.98  # part of one that ends at a stop: a longer one would end there again
 
 
@@ -79,13 +80,13 @@ def memory_error(task, x, m, m_other, j):
 
 
 @numba.njit(**INNER)
-def rejected(lane, error, task):
-    """Whether the error of a step is too large; if so, propose a shorter one."""
+def rejected(lane, error, task, least):
+    """Whether the error of a step is too large; if so, propose at least some part of it."""
     finite = np.isfinite(error)
     if error <= 1.0 or (task.fixed > 0.0 and finite):
         return False
     order = rodas5p.ORDER if lane.stiff else task.pair.order
-    shorten(lane, max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
+    shorten(lane, max(least, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
         lane.status = DIVERGED
     return True

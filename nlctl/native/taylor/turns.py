@@ -108,11 +108,12 @@ def _by_pair(run: Run, settings: Settings) -> Run:
     lane = run.lanes[0]
     if lane["span"] > FIRST_TURN:
         lane["span"], lane["stay"] = MEASURED, min(2 * lane["stay"], _MOST)
+        lane["wait"] = 0  # it has paid
     else:
         lane["wait"] = max(2 * lane["wait"], MEASURED)
         lane["span"], lane["stay"] = lane["wait"], _SPAN
     lane["h"] = lane["other_pace"] or lane["h"]  # as it was when the pair was measured
-    for name in ("tries", "seeks", "traces", "returns", "across", "cross"):
+    for name in ("tries", "seeks", "traces", "returns", "across", "cross", "at_once"):
         lane[name] = 0  # what was being located is found again
     task = with_fields(run.task, taylor=_COMPARED, pair=pair_of(settings.pair))
     return replace(run, task=task, work=with_stages(run.work, settings.pair.stages))

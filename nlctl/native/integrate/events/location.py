@@ -16,6 +16,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ..control import SMALLEST
 from ..state import INNER, is_stiff, opposite
 
 SMALL_KINK = 0.01  # of the absolute tolerance
@@ -97,7 +98,7 @@ def locate(lane, task, w, j):
     lane.tries += 1
     # behind a break point stages are wrong by the rest; what a memory misses is quadratic in it
     behind = behind_turn(task.rtol) if memory else behind_event(task.rtol)
-    tolerance = lane.high * behind
+    tolerance = max(lane.high * behind, SMALLEST * abs(lane.t), lane.at_once if memory else 0.0)
     is_behind, is_close = lane.high == lane.step, lane.high - root <= tolerance
     if is_behind and ((is_close and lane.nearly) or lane.tries > TRIES):
         return EVENT
@@ -219,7 +220,7 @@ def locate_jump(lane, rtol, is_behind):
     else:
         lane.low = lane.step
     lane.tries += 1
-    rest = max(behind_event(rtol) * lane.high, 4e-16 * abs(lane.t))
+    rest = max(behind_event(rtol) * lane.high, SMALLEST * abs(lane.t))
     found = lane.high - lane.low <= rest
     if found and (is_behind or lane.low == lane.high):
         return EVENT

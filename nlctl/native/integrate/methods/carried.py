@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import numba
 
+from ..control import SMALLEST
 from ..events.location import behind_turn
 from ..state import INNER, opposite
-from .crossings import first_crossing, is_followed, part_behind_root
+from .crossings import first_crossing, followed_part, part_behind_root
 from .dips import value_and_slope
+
+_MISSED = 0.1  # of its tolerance: what a memory may have gone on behind its turn
 
 
 @numba.njit(**INNER)
@@ -38,6 +41,17 @@ def fill_slopes(task, w, j):
 
 
 @numba.njit(**INNER)
+def part_of_rates(task, w, h, j):
+    """Return in which part of a step h the rates of memories that are carried are followed."""
+    part = 1.0
+    for i in range(task.rows.memory.size):
+        if w.memories.rate_start[i, j] != 0.0:
+            row, highest = memory_rate_row(task, w, i), task.taylor.highest - 2
+            part = min(part, followed_part(highest, h, w.taylor.terms, row, 0.0, j))
+    return part
+
+
+@numba.njit(**INNER)
 def foreseen_turn(task, lane, w, j):
     """Return the part of a step that ends right behind the first turn of a memory, 1 for none."""
     first, terms, highest = 1.0, w.taylor.terms, task.taylor.highest - 2
@@ -49,7 +63,29 @@ def foreseen_turn(task, lane, w, j):
             ends = terms[0, row, j], end
             root = part_behind_root(highest, lane.step, terms, row, ends, rest, j)
             first = min(first, root * (1.0 + rest))
+        elif _turns_at_once(task, w, i, j):
+            part = _missing_little(task, lane, w, i, rest, j)
+            lane.at_once, first = part * lane.step, min(first, part)
     return first
+
+
+@numba.njit(**INNER)
+def _turns_at_once(task, w, i, j):
+    """Whether a memory turns where a step begins: its rate is seen by rounding there."""
+    return opposite(w.memories.rate_start[i, j], w.taylor.terms[0, memory_rate_row(task, w, i), j])
+
+
+@numba.njit(**INNER)
+def _missing_little(task, lane, w, i, part, j):
+    """Return up to which part of a step a memory that is to turn there may be carried along."""
+    row, terms, highest = memory_row(task, w, i), w.taylor.terms, task.taylor.highest - 1
+    begins = terms[0, row, j]
+    while part * lane.step > SMALLEST * abs(lane.t):
+        missed = value_and_slope(highest, part * lane.step, terms, row, j)[0] - begins
+        if not abs(missed) > _MISSED * (task.atol + task.rtol * abs(begins)):
+            break
+        part *= 0.25
+    return part
 
 
 @numba.njit(**INNER)
@@ -73,8 +109,11 @@ def turns_inside(task, w, until, j):
         start, row = w.memories.rate_start[i, j], memory_rate_row(task, w, i)
         if start == 0.0:
             continue
-        if not is_followed(highest, w.h[j], terms, row, 0.0, j):
-            first = min(first, 0.5)
+        if _turns_at_once(task, w, i, j):
+            start = -start
+        part = followed_part(highest, w.h[j], terms, row, 0.0, j)
+        if part < 1.0:
+            first = min(first, part)
             continue
         turn = first_crossing(highest, w.h[j], terms, row, start, until, w.taylor.shifted, j)[0]
         if turn < until:

@@ -8,13 +8,14 @@ from ..state import INNER, opposite
 from .dips import first_dip, lacking, value_and_slope
 
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
+_WITHIN = 0.95  # of where they are that small
 PLACES_LOOKED_AT = 16  # parts of a step
 _TURNS = 5  # attempts at where a polynomial is least
 
 
 @numba.njit(**INNER)
-def is_followed(highest, h, terms, row, small, j):
-    """Whether a polynomial's terms have become small at h: its last two add little to the rest."""
+def followed_part(highest, h, terms, row, small, j):
+    """Return in which part of h a polynomial is followed: its last two terms add little."""
     # Where all of them are `small` they may be rounding, which is not small beside itself.
     total, power, last = abs(terms[0, row, j]) + small, 1.0, 0.0
     for k in range(1, highest + 1):
@@ -23,7 +24,9 @@ def is_followed(highest, h, terms, row, small, j):
         total += part
         if k >= highest - 1:
             last += part
-    return not last > FOLLOWED * total  # NaN is found elsewhere
+    if not last > FOLLOWED * total:  # NaN is found elsewhere
+        return 1.0
+    return _WITHIN * (FOLLOWED * total / last) ** (1.0 / (highest - 1.0))
 
 
 @numba.njit(**INNER)

@@ -21,17 +21,25 @@ from ...machine.address import (
     call_step,
     call_values,
 )
+from ..control import LEAST
 from ..evaluate import hold_memories, input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
-from .carried import fill_slopes, foreseen_turn, memory_row, turns_inside, turns_until
+from .carried import (
+    fill_slopes,
+    foreseen_turn,
+    memory_row,
+    part_of_rates,
+    turns_inside,
+    turns_until,
+)
 from .crossings import (
     PLACES_LOOKED_AT,
     first_crossing,
+    followed_part,
     is_at,
-    is_followed,
     part_behind_root,
     side_left_to,
 )
@@ -42,6 +50,7 @@ _AIM = 0.25  # of the tolerance: what the error of a step is to be
 _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
+_LEAST = 1e-4  # part of a step that is tried next before what polynomials foresee
 _SHORTEST = 1e-12  # of the times: a step in which nothing is compared
 _LONGER, _LEFT = 16.0, 1e6  # times as long; and times the shortest, after which a place is left
 _EXPANSION, _GROWTH, _STEP, _JUDGE, _VALUES = 0, 1, 2, 3, 4  # functions of task.taylor.functions
@@ -110,7 +119,7 @@ def expand(task, lanes, w):
         if taylor.expanded[j] == 0 and task.fixed == 0.0:
             h = _length(task.taylor.highest, taylor.largest, j)
             if h > 0.0:
-                lanes[j].h = h
+                lanes[j].h = _followed(task, w, h, j)
             if _begins_at_jump(task, taylor.terms, j):
                 lanes[j].h = _leaving(task, lanes[j])
         taylor.expanded[j] = 1
@@ -130,6 +139,26 @@ def _lacks_terms(task, w, j):
         for k in range(2, task.taylor.highest + 1):
             lacks |= not np.isfinite(taylor.terms[k, i, j])
     return lacks
+
+
+@numba.njit(**INNER)
+def _followed(task, w, h, j):
+    """Return up to which step, of h at most, the polynomials are followed that are looked at."""
+    if h <= _shortest(task):
+        return h
+    part, p, terms = part_of_rates(task, w, h, j), task.taylor.highest - 1, w.taylor.terms
+    for i in range(task.rows.switching):
+        row = w.x.shape[0] + i
+        part = min(part, followed_part(p, h, terms, row, _unseen(task, i), j))
+    for i in range(task.taylor.sides.shape[0]):
+        part = min(part, followed_part(p, h, terms, task.taylor.sides[i, 0], 0.0, j))
+    return max(part * h, _shortest(task))
+
+
+@numba.njit(**INNER)
+def _unseen(task, i):
+    """Return within what of 0 a switching function may be without an event, see `first_root`."""
+    return SMALL_KINK * task.atol if i < task.rows.declared else 0.0
 
 
 @numba.njit(**INNER)
@@ -231,6 +260,8 @@ def _aim(task, lanes, w):
     events_at(task, lanes, w, w.ahead.g)
     for j in range(lanes.size):
         lane, first = lanes[j], 1.0
+        if lane.tries == 0:
+            lane.at_once = 0.0
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
             if _meets(task, w, i, w.ahead.g[i, j], j):
                 ends = w.events.g_start[i, j], w.ahead.g[i, j]
@@ -308,12 +339,20 @@ def _error(task, w, j):
     # In a step with an event the right-hand side has changed before the end: the last term counts.
     defect, term = w.taylor.largest[0, j], w.taylor.largest[1, j]
     if w.inside.looked[j] != 0.0:  # on another side inside: a shorter step is to be tried
-        return (0.9 / min(w.inside.foreseen[j], 0.8)) ** task.pair.order + 0.0 * (defect + term)
+        part = min(max(w.inside.foreseen[j], _LEAST), 0.8)
+        return (0.9 / part) ** task.pair.order + 0.0 * (defect + term)
     for i in range(task.rows.switching):
         if _meets(task, w, i, w.events.g[i, j], j):
             return term + 0.0 * defect
     share = defect / (task.taylor.highest + 1.0)
     return share if share <= term else defect + 0.0 * term
+
+
+@numba.njit(**INNER)
+def least_part(task, w, j):
+    """Return how much of a step whose error is too large is tried next at least."""
+    # The polynomials say how far it is to where something is on another side.
+    return _LEAST if task.taylor.highest and w.inside.looked[j] != 0.0 else LEAST
 
 
 @numba.njit(**INNER)
@@ -342,8 +381,9 @@ def _compare(task, lane, w, j):
     if again < 1.0:
         inside.looked[j], inside.foreseen[j] = -1.0, again
     for i in range(task.rows.switching):
-        if not _follows(task, w, i, until, j):
-            inside.looked[j], inside.foreseen[j] = -1.0, 0.5
+        part = _follows(task, w, i, until, j)
+        if part < 1.0:
+            inside.looked[j], inside.foreseen[j] = -1.0, part
         elif not opposite(events.g_start[i, j], events.g[i, j]):
             side = events.g_start[i, j]
             if side == 0.0:
@@ -356,8 +396,9 @@ def _compare(task, lane, w, j):
             if first < until:  # a step that ends there has an event
                 inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
     for i in range(task.taylor.sides.shape[0]):
-        first, farthest, row = 0.5, -1.0, task.taylor.sides[i, 0]
-        if is_followed(p, w.h[j], taylor.terms, row, 0.0, j):
+        farthest, row = -1.0, task.taylor.sides[i, 0]
+        first = followed_part(p, w.h[j], taylor.terms, row, 0.0, j)
+        if first == 1.0:
             side = taylor.terms[p, task.taylor.sides[i, 1], j]
             first, farthest = first_crossing(
                 p, w.h[j], taylor.terms, row, side, until, taylor.shifted, j
@@ -369,15 +410,12 @@ def _compare(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _follows(task, w, i, until, j):
-    """Whether the polynomial of a switching function says what it is within a lane's step."""
-    p, row = task.taylor.highest - 1, w.x.shape[0] + i
-    # What only bends may be within this of 0 without an event, see `first_root`.
-    small = SMALL_KINK * task.atol if i < task.rows.declared else 0.0
-    if not is_followed(p, w.h[j], w.taylor.terms, row, small, j):
-        return False
-    if until < 1.0 or w.h[j] <= 1e6 * _shortest(task):
-        return True  # something jumps before the end, or rounding has a say there
-    return is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], small, j)
+    """Return in which part of a step the polynomial of a switching function says what it is."""
+    p, row, small = task.taylor.highest - 1, w.x.shape[0] + i, _unseen(task, i)
+    part = followed_part(p, w.h[j], w.taylor.terms, row, small, j)
+    if part < 1.0 or until < 1.0 or w.h[j] <= 1e6 * _shortest(task):
+        return part  # something jumps before the end, or rounding has a say there
+    return 1.0 if is_at(p, w.h[j], w.taylor.terms, row, w.events.g[i, j], small, j) else 0.5
 
 
 @numba.njit(**INNER)
