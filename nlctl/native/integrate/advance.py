@@ -353,6 +353,8 @@ def _note_events(task, lanes, w, found, done):
     for j in range(lanes.size):
         if done[j]:
             _note_left(task, lanes[j], w, found[j] == EVENT, j)
+            if found[j] != EVENT and w.memories.rate_start[:, j].any():
+                lanes[j].turned = 0
         if not done[j] or found[j] != EVENT:
             continue
         turns = 1 if rows.memory.size else 0
@@ -369,9 +371,9 @@ def _note_events(task, lanes, w, found, done):
         for i in range(rows.guarded, rows.switching):
             if w.guards.above[i - rows.guarded, j] != 0 and events.g[i, j] < 0.0:
                 turns = 0
-        if turns and not (lanes[j].at_once > 0.0 and lanes[j].begun == lanes[j].turned_at):
-            lanes[j].turns += 1  # located in one step
-        lanes[j].turned_at = lanes[j].t if turns else np.nan
+        if turns and not (lanes[j].at_once > 0.0 and lanes[j].turned):  # that is the same one
+            lanes[j].turns += 1
+            lanes[j].turned = 1
 
 
 @numba.njit(**INNER)

@@ -60,7 +60,7 @@ _FIELDS = [
     ("low_error", "f8"),  # that of the step `low`
     ("low_before", "f8"),  # the step without it that was tried before `low`
     ("at_once", "f8"),  # a step that ends right behind where it begins: a memory turns there
-    ("turned_at", "f8"),  # time of the last event, if a memory turned there
+    ("turned", "i8"),  # whether a memory has turned, and none has been carried since
     ("whole", "f8"),  # the step in which the condition that is being located was found
     ("fell_at", "f8"),  # time of the last reset
     ("since", "f8"),  # time of the first of the resets without progress of time
@@ -111,7 +111,7 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
     lanes["status"] = RUNNING
     lanes["left"], lanes["right"] = np.inf, -np.inf
     lanes["rests"] = 1
-    lanes["fell_at"] = lanes["leaving"] = lanes["turned_at"] = np.nan
+    lanes["fell_at"] = lanes["leaving"] = np.nan
     lanes["culprit"] = -1
     lanes["patience"] = FIRST_PATIENCE
     return lanes

@@ -474,6 +474,12 @@ class TestExample2:
         assert made.statistics.events in (8, 9)  # rounding where a memory has turned may be one
         assert made.statistics.turns in (7, 8)  # one may be located in two steps
 
+    @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+    def test_rounding_is_no_other_turn_of_a_memory(self, loop, rtol):
+        """Few attempts of Taylor's method fail: up to 40 did at each turn that was rounding."""
+        made = run(loop, np.linspace(0, 20, 201), rtol=rtol, atol=rtol, method="taylor")
+        assert made.statistics.rejected < 8 * made.statistics.events
+
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
     def test_the_error_falls_with_the_tolerance(self, loop, method):
         """In every state at every time; at most 1e-9 at rtol 1e-10 by the explicit method."""
