@@ -17,7 +17,7 @@ SMALLEST = 4e-16  # of the time: no shorter step can be told from none
 TRIAL = 20  # steps of the stiff method before it is judged
 MAX_PATIENCE = 2000
 _TO_STOP = 1.01  # times a step: a stop so close ends it
-LEAST = 0.2  # part of a step that is tried next if its error is too large
+LEAST_PART = 0.2  # part of a step that is tried next if its error is too large
 _NOTICED = 0.98  # part of one that ends at a stop: a longer one would end there again
 
 

@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out
-from .control import LEAST, rejected
+from .control import LEAST_PART, rejected
 from .delayed import DEGREE, arrival, next_arrival, past_value, piece_at, sent
 from .evaluate import inputs_at, on_this_side
 from .methods import explicit
@@ -159,7 +159,7 @@ def unresolved(task, lane, w, j, event):
     if short and past.missed[j] > 1.0:
         past.missed[j] = -1.0
         return False
-    if rejected(lane, past.missed[j], task, LEAST):
+    if rejected(lane, past.missed[j], task, LEAST_PART):
         return True
     w.error[j] = max(w.error[j], past.missed[j])
     return False

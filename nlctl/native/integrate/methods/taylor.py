@@ -21,7 +21,7 @@ from ...machine.address import (
     call_step,
     call_values,
 )
-from ..control import LEAST
+from ..control import LEAST_PART
 from ..evaluate import hold_memories, input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
@@ -352,7 +352,7 @@ def _error(task, w, j):
 def least_part(task, w, j):
     """Return how much of a step whose error is too large is tried next at least."""
     # The polynomials say how far it is to where something is on another side.
-    return _LEAST if task.taylor.highest and w.inside.looked[j] != 0.0 else LEAST
+    return _LEAST if task.taylor.highest and w.inside.looked[j] != 0.0 else LEAST_PART
 
 
 @numba.njit(**INNER)
@@ -370,7 +370,7 @@ def _compare(task, lane, w, j):
         return
     if w.h[j] <= _shortest(task):
         return
-    until, p, n = 1.0, task.taylor.highest - 1, w.x.shape[0]
+    until, p = 1.0, task.taylor.highest - 1
     for i in range(task.rows.switching):
         before, now = events.g_start[i, j], events.g[i, j]
         if _meets(task, w, i, now, j):
@@ -381,20 +381,9 @@ def _compare(task, lane, w, j):
     if again < 1.0:
         inside.looked[j], inside.foreseen[j] = -1.0, again
     for i in range(task.rows.switching):
-        part = _follows(task, w, i, until, j)
-        if part < 1.0:
-            inside.looked[j], inside.foreseen[j] = -1.0, part
-        elif not opposite(events.g_start[i, j], events.g[i, j]):
-            side = events.g_start[i, j]
-            if side == 0.0:
-                side = side_left_to(p, taylor.terms, n + i, j)
-            if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
-                side = 1.0
-            first, farthest = first_crossing(
-                p, w.h[j], taylor.terms, n + i, side, until, taylor.shifted, j
-            )
-            if first < until:  # a step that ends there has an event
-                inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
+        first, farthest = _other_side(task, w, i, until, j)
+        if first < until:  # a step that ends there has an event
+            inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
     for i in range(task.taylor.sides.shape[0]):
         farthest, row = -1.0, task.taylor.sides[i, 0]
         first = followed_part(p, w.h[j], taylor.terms, row, 0.0, j)
@@ -406,6 +395,23 @@ def _compare(task, lane, w, j):
         if first < until:
             inside.looked[j] = -1.0 if inside.looked[j] != 0.0 else farthest
             inside.foreseen[j] = min(inside.foreseen[j], first)
+
+
+@numba.njit(**INNER)
+def _other_side(task, w, i, until, j):
+    """Return where in a step a switching function is on another side first, and where farthest."""
+    # 1 for nowhere; -1, and up to where its polynomial says what it is, if that is not all of it.
+    p, row, part = task.taylor.highest - 1, w.x.shape[0] + i, _follows(task, w, i, until, j)
+    if part < 1.0:
+        return -1.0, part
+    side = w.events.g_start[i, j]
+    if opposite(side, w.events.g[i, j]):
+        return 1.0, 1.0
+    if side == 0.0:
+        side = side_left_to(p, w.taylor.terms, row, j)
+    if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
+        side = 1.0
+    return first_crossing(p, w.h[j], w.taylor.terms, row, side, until, w.taylor.shifted, j)
 
 
 @numba.njit(**INNER)
