@@ -148,10 +148,12 @@ def _tolerance(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
     """Compare a run with one of tighter tolerances."""
     if not ct.isctime(loop):
         return "discrete time has none", "not applicable"
+    run = response.statistics
+    rtol, atol = (RTOL, ATOL) if run is None else (run.rtol, run.atol)
     try:
         again = input_output_response(
             loop, response.time, response.u, response.x[:, 0], params=params,
-            rtol=_TIGHTER * RTOL, atol=_TIGHTER * ATOL,
+            rtol=_TIGHTER * rtol, atol=_TIGHTER * atol,
         )  # fmt: skip
     except DivergedError as error:
         return f"with tighter ones {error}", "fail"
@@ -159,7 +161,7 @@ def _tolerance(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
     off = np.max(np.abs(again.y - response.y), axis=1) / scale
     worst = int(np.argmax(off))
     finding = (
-        f"at rtol {_TIGHTER * RTOL:.0e} {response.output_labels[worst]} differs most, by "
+        f"at rtol {_TIGHTER * rtol:.0e} {response.output_labels[worst]} differs most, by "
         f"{off[worst]:.1e} of its range"
     )
     return finding, "pass" if off[worst] <= _SAME else "caution"

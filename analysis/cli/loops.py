@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -152,6 +152,11 @@ def number_of(name: str, text: str) -> float:
         raise ParameterError(f"{name} needs a number, got '{text}'") from None
 
 
+def given_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:
+    """Return the tolerances that were given, by their names."""
+    return {name: value for name, value in (("rtol", rtol), ("atol", atol)) if value is not None}
+
+
 @dataclass(frozen=True, kw_only=True)
 class AskedRun:
     """A run of a loop, as options of a command ask for it."""
@@ -161,6 +166,7 @@ class AskedRun:
     inputs: Sequence[str]
     until: float = USUAL_HORIZON
     step: float = USUAL_STEP
+    tolerances: Mapping[str, float] = field(default_factory=dict)  # rtol, atol, where given
 
     def command(self, verb: str) -> list[str]:
         """Return the command that asks for it, as words."""
@@ -168,7 +174,8 @@ class AskedRun:
         words += [part for text in self.settings for part in ("--set", text)]
         words += [part for text in self.inputs for part in ("--input", text)]
         words += ["--until", f"{self.until:g}"] * (self.until != USUAL_HORIZON)
-        return words + ["--step", f"{self.step:g}"] * (self.step != USUAL_STEP)
+        words += ["--step", f"{self.step:g}"] * (self.step != USUAL_STEP)
+        return words + [w for k, v in self.tolerances.items() for w in (f"--{k}", f"{v:g}")]
 
 
 @described_record
@@ -199,6 +206,7 @@ def simulated(run: AskedRun, engine: str = "auto") -> Simulated:
             reached[0] = t
 
         response = input_output_response(
-            loop, times, u, start, params=params, engine=engine, progress=progress
-        )
+            loop, times, u, start, params=params, engine=engine, progress=progress,
+            **run.tolerances,
+        )  # fmt: skip
     return Simulated(loop=loop, response=response, params=params, start=start)

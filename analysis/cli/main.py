@@ -11,9 +11,17 @@ import typer
 
 from nlctl.errors import ParameterError
 
-from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun, assignments, named_loop, simulated
-from .printing import error_line, say
-from .report import Input, Set, compare_command, report, write_gallery_of
+from .loops import (
+    USUAL_HORIZON,
+    USUAL_STEP,
+    AskedRun,
+    assignments,
+    given_tolerances,
+    named_loop,
+    simulated,
+)
+from .printing import error_line, notify, say
+from .report import Atol, Input, Rtol, Set, compare_command, report, write_gallery_of
 from .studies import (
     FAILS,
     OPEN,
@@ -73,6 +81,8 @@ def simulate(
     ] = "auto",
     until: Annotated[float, typer.Option(help="Horizon in s.")] = USUAL_HORIZON,
     step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = USUAL_STEP,
+    rtol: Rtol = None,
+    atol: Atol = None,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
 ) -> None:
@@ -86,11 +96,16 @@ def simulate(
         check_figure(plot)
     if csv is not None:
         check_file(csv)
-    run = AskedRun(loop=loop, settings=set_ or [], inputs=input_ or [], until=until, step=step)
+    run = AskedRun(
+        loop=loop, settings=set_ or [], inputs=input_ or [], until=until, step=step,
+        tolerances=given_tolerances(rtol, atol),
+    )  # fmt: skip
     response = simulated(run, engine).response
     times = response.time
     signals = dict(zip(response.output_labels, response.y, strict=True))
     show_metrics(times, signals)
+    if small := response.small_outputs():
+        notify(small)
     if csv is not None:
         _write_csv(csv, times, signals)
         print(csv)

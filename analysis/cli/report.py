@@ -17,7 +17,7 @@ from nlctl.wording import counted
 
 from ..papers import paper_key
 from . import studies, written_page
-from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun
+from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun, given_tolerances
 from .memory import TO_BEGIN, check_memory
 from .own_page import compose_page, is_loop_name, is_paper_name, page_folder
 from .printing import error_line, in_json, notify, say
@@ -38,6 +38,13 @@ Set = Annotated[
 Input = Annotated[
     list[str] | None,
     typer.Option("--input", metavar="NAME=VALUE", help="A constant input of a loop; 0 by default."),
+]
+Rtol = Annotated[
+    float | None, typer.Option(help="Relative tolerance of a run of a loop; 1e-8 by default.")
+]
+Atol = Annotated[
+    float | None,
+    typer.Option(help="The absolute one, in the units of states; 1e-10 by default."),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
 Pdf = Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")]
@@ -74,6 +81,8 @@ def report(
     step: Annotated[
         float | None, typer.Option(help="Sampling interval of a loop, s; 0.01.")
     ] = None,
+    rtol: Rtol = None,
+    atol: Atol = None,
     open_: Open = False,
     pdf: Pdf = False,
     junit: studies.Junit = None,
@@ -122,14 +131,10 @@ def report(
     )
     with studies.exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
-        _check_loop_options(is_loop, set_, input_, until, step, require)
+        _check_loop_options(is_loop, set_, input_, until, step, rtol, atol, require)
         studies.check_junit(junit)
         if what is None or is_paper_name(str(what)):
-            if move:
-                raise UsageError(
-                    "--move is of a loop or a study; the page of a paper has its own sliders, "
-                    "with --live"
-                )
+            _check_nothing_moves(move)
             key = "lv_2017" if what is None else paper_key(str(what), "file, folder or paper")
             folder = out or Path("reports", "paper" if what is None else key)
             written = _paper(key, folder, options, far=far)
@@ -140,6 +145,7 @@ def report(
                 inputs=input_ or [],
                 until=USUAL_HORIZON if until is None else until,
                 step=USUAL_STEP if step is None else step,
+                tolerances=given_tolerances(rtol, atol),
             )
             written = _loop(run, require or [], options)
         else:
@@ -157,8 +163,16 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
     """Refuse what is set of a loop where there is none."""
     if not is_loop and any(option is not None for option in options):
         raise UsageError(
-            "--set, --input, --until, --step and --require are of a loop, "
+            "--set, --input, --until, --step, --rtol, --atol and --require are of a loop, "
             "path/to/file.py:function; a study has them in its file"
+        )
+
+
+def _check_nothing_moves(move: Sequence[str] | None) -> None:
+    """Refuse sliders of one's own on the page of a paper."""
+    if move:
+        raise UsageError(
+            "--move is of a loop or a study; the page of a paper has its own sliders, with --live"
         )
 
 

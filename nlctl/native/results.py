@@ -34,6 +34,8 @@ class Statistics:
     turns: int = 0
     # Functions that were called, not written out, since a loop in them took too many passes.
     called: tuple[str, ...] = ()
+    rtol: float = np.nan  # Tolerances of steps; none in discrete time.
+    atol: float = np.nan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +81,8 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         ),
         opaque=bool(run.task.timed.opaque),
         turns=int(lane["turns"]),
+        rtol=float(run.task.rtol),
+        atol=float(run.task.atol),
     )
     states = run.work.samples[:done, :, j].T.copy()  # the next run may have the memory of this one
     if lane["resumes"]:  # a run that resumes there takes the sample

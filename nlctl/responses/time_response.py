@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SHOWN = 6  # names that are listed before the rest is only counted
+_SMALL = 100  # times `atol`: what is smaller has an error of a part of itself
 _ROWS = 4  # signals that have room in a row each
 _BY_KIND = "signals by kind"  # a figure that python-control does not know
 _ROW = 1.2  # in, the least height of a row
@@ -169,7 +170,31 @@ class Response(ct.TimeResponseData):
             if run.called:
                 names = ", ".join(run.called)
                 lines.append(f"  called   {names}: a loop takes more passes than are written out")
+            if small := self.small_outputs():
+                lines.append(f"  small    {small}")
         return "\n".join(lines)
+
+    def small_outputs(self) -> str:
+        """Say which outputs are so small that `atol` may be all of their error; '' for none.
+
+        Examples
+        --------
+        >>> tank = ct.ss(-1, 1, 1, 0, inputs=["q"], outputs=["h"], name="tank")
+        >>> nlctl.input_output_response(tank, [0, 1], 1e-9).small_outputs()
+        'h is at most 6.32e-10, of the size of atol = 1e-10: take a smaller atol'
+        """
+        if self.statistics is None or not self.statistics.atol > 0:
+            return ""
+        largest = np.max(np.abs(np.reshape(self.y, (self.noutputs, -1))), axis=1, initial=0.0)
+        rows = np.flatnonzero((largest > 0) & (largest < _SMALL * self.statistics.atol))
+        if not rows.size:
+            return ""
+        names = _names([(self.output_labels or [])[i] for i in rows])
+        return (
+            f"{names} {'is' if rows.size == 1 else 'are'} at most "
+            f"{largest[rows].max():.3g}, of the size of atol = {self.statistics.atol:g}: take a "
+            "smaller atol"
+        )
 
     def _repr_html_(self) -> str:
         """What a notebook shows: how the run went, and the range of each output."""

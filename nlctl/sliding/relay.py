@@ -62,7 +62,8 @@ class IdealRelay:
     is the mean output).  It ends where |v| reaches the height.  Entry and end are events.
 
     What is left of u where the entry is located, and by rounding, decays with `rate` while it
-    slides.  Beyond `rest` it slides no longer: something else has made u jump.
+    slides.  Beyond `rest` it slides no longer: something else has made u jump.  `rest` and
+    `rest_rate` are in the units of u: where u itself is as small as these, take smaller ones.
 
     v may enter u' through saturations and other bends, u' = R(v) in straight pieces (np.clip,
     min, max, abs, choices that do not jump), if u' only falls or only rises with v: v is then the

@@ -54,6 +54,28 @@ def test_help_imports_nothing_heavy():
     assert result.stderr.strip() == "[]"
 
 
+def test_small_signals_need_a_small_tolerance(tmp_path):
+    """In m and A rather than nm and uA: what `atol` may be all of is named, and no page of it."""
+    (tmp_path / "stage.py").write_text(
+        "import control as ct\n"
+        "import numpy as np\n"
+        "def make():\n"
+        "    sine = ct.nlsys(None, lambda t, x, u, p: np.sin(5 * t), inputs=0, outputs=['u'])\n"
+        "    stage = ct.ss([[0, 1], [-4e4, -8]], [[0], [4e-7]], [[1, 0]], 0, inputs=['u'], "
+        "outputs=['y'])\n"
+        "    return ct.interconnect([sine, stage], outputs=['y'], name='stage')\n"
+    )
+    run = ("simulate", "stage.py:make", "--until", "2")
+    assert "take a smaller atol" in nlctl_here(*run, cwd=tmp_path).stderr
+    fine = nlctl_here(*run, "--atol", "1e-18", "--csv", "out.csv", cwd=tmp_path)
+    assert fine.returncode == 0
+    assert "atol" not in fine.stderr
+    late = pd.read_csv(tmp_path / "out.csv")["y"][100:]
+    assert late.abs().max() == pytest.approx(1e-11, rel=1e-2)
+    assert "simulate it with smaller tolerances" in refused("report", *run[1:], cwd=tmp_path)
+    assert "finite atol > 0" in refused(*run, "--atol", "0", cwd=tmp_path)
+
+
 @pytest.mark.slow
 def test_simulate_writes_what_was_asked_for(tmp_path):
     """The table starts from the initial state that was set; the figure is an SVG."""
