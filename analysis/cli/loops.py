@@ -166,7 +166,7 @@ class AskedRun:
     inputs: Sequence[str]
     until: float = USUAL_HORIZON
     step: float = USUAL_STEP
-    tolerances: Mapping[str, float] = field(default_factory=dict)  # rtol, atol, where given
+    tolerances: Mapping[str, Any] = field(default_factory=dict)  # rtol, atol, where given
 
     def command(self, verb: str) -> list[str]:
         """Return the command that asks for it, as words."""
