@@ -96,7 +96,7 @@ def _generated(function: Readable, sides: int, sign: int) -> BoxCode | None:
         graph, results = function.read[sides]
         if len(results) > 1:
             return enclosed(results, sides)
-        return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
+        return enclosed(_apart(graph, graph.number(results[0]), sign), sides, all_exist=True)
     except (Untraceable, CompileError):  # the latter where the C library lacks a function
         return None
 

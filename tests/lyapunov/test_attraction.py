@@ -1,5 +1,7 @@
 """Regions of attraction and barriers: closed forms, published levels, and trajectories."""
 
+from fractions import Fraction
+
 import control as ct
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 import nlctl
 from nlctl.analysis.intervals.machine import only_balls
 from nlctl.analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
+from nlctl.analysis.lyapunov.attraction.level import reach_of_level
 from nlctl.analysis.lyapunov.attraction.squares import PositiveCondition, positive_where
 from nlctl.errors import ParameterError
 
@@ -314,3 +317,41 @@ def test_integers_that_are_given_steer_what_is_proved():
         assert barrier(loop, box, params={"n": n}, **far).status == status
     run = nlctl.input_output_response(loop, np.linspace(0, 4, 41), 0, [1.0, 0.0], params={"n": 4})
     assert run.states.min() < -0.95
+
+
+def test_a_set_that_is_proved_is_not_larger_in_words():
+    """A level is rounded down, and what is not proved beyond it up; the box's own is no refuted."""
+    found = region_of_attraction(van_der_pol, square_box(2, 3.0), P=KHALIL)
+    first, _, rest = str(found).removeprefix("V <= ").partition(" proved on ")
+    assert 0 <= found.level - float(first) <= 1e-5
+    assert float(rest.partition("; ")[2].partition(" is not")[0]) >= found.above
+    assert f"V <= {first} everything" in found.claim
+    whole = region_of_attraction(cube, square_box(1, 1.0), P=[[1.0]])
+    assert whole.level == whole.above
+    assert "more is not: the box: take a larger one" in str(whole)
+
+
+@pytest.mark.parametrize("seed", [4, 16, 35])
+def test_an_ellipsoid_reaches_no_less_far_than_it_is_said(seed):
+    """(P^-1)_ii exactly; that of floats is 1e-5 less for such P."""
+    rng = np.random.default_rng(seed)
+    Q = np.linalg.qr(rng.standard_normal((2, 2)))[0]
+    P = Q @ np.diag([1.0, 1e-12]) @ Q.T
+    P = 0.5 * (P + P.T)
+    (a, b), (_, c) = [[Fraction(float(v)) for v in row] for row in P]
+    for reach, square in zip(reach_of_level(P, 0.3), (c, a), strict=True):
+        assert Fraction(float(reach)) ** 2 >= Fraction(0.3) * square / (a * c - b * b)
+
+
+@pytest.mark.parametrize("P", [[[0.5, 1.5], [1.5, 4.5]], [[1.0, np.nan], [np.nan, 1.0]]])
+def test_a_matrix_that_floats_take_for_definite_is_refused(P):
+    """The first has the determinant 0 and, in floats, no eigenvalue that is not above it."""
+    with pytest.raises(ParameterError, match="positive definite"):
+        region_of_attraction(lambda x: (-x[0], -x[1]), square_box(2, 1.0), P=P)
+
+
+def test_a_point_on_the_way_is_named_as_what_is_missing():
+    """No barrier is between a start and a point that it comes to."""
+    start, unsafe = Box.of(x1=(2, 2), x2=(0, 0)), Box.of(x1=(1, 1), x2=(0, 0))
+    found = barrier(lambda x: (-x[0], -x[1]), square_box(2, 3.0), start=start, unsafe=unsafe)
+    assert str(found) == "undecided: not proved: B' < 0 where B = 0"

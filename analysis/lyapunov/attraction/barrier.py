@@ -363,6 +363,7 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
         if coefficients is None:
             return none, boxes, f"no polynomial keeps samples apart: {reason or 'raise degree'}"
         if _mistakes(problem, coefficients):
+            reason = problem.claims[-1].what
             continue
         reason = ""
         for claim in problem.claims:

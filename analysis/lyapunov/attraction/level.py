@@ -13,6 +13,7 @@ from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 
 from ...intervals.box import Box
+from ...intervals.exact_matrices import exact_matrix, is_positive_definite
 from .motion import StateRates
 
 _STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
@@ -97,8 +98,9 @@ class ProvedLevel:
 
 def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedLevel:
     """Return the largest level that is proved, to a relative tolerance."""
-    fits = V.largest_in(box) * _INSIDE
-    low, boxes = _floor(V, fits, box), 0
+    is_definite = is_positive_definite(exact_matrix(V.P))
+    fits = V.largest_in(box) * _INSIDE if is_definite else 0.0
+    low, boxes = _floor(V, fits, box) if is_definite else 0.0, 0
     nothing = {"V": V, "level": 0.0, "floor": low, "above": fits, "refuted": None}
     if low == 0.0:
         return ProvedLevel(**nothing, boxes=0, reason="the linear part decides nothing next to it")
@@ -146,13 +148,21 @@ def _floor(V: Quadratic, fits: float, box: Box) -> float:
     # is negative definite for all of them.
     level = fits * 0.25
     while level > fits * _SMALLEST:
-        reach = np.sqrt(level * np.diag(np.linalg.inv(V.P))) * (1 + 1e-6)  # of the level set
+        reach = reach_of_level(V.P, level)
         low, high = np.maximum(V.at - reach, box.low), np.minimum(V.at + reach, box.high)
         ends = V.motion.slopes.values(low[None], high[None])
         if np.all(np.isfinite(ends)) and _is_negative(V.P, *(e[0] for e in ends)):
             return level
         level /= 4
     return 0.0
+
+
+def reach_of_level(P: np.ndarray, level: float) -> np.ndarray:
+    """Return how far z^T P z <= level reaches along each axis, and a little more: not less."""
+    # An inverse in floats may be off by more than any little.
+    inverse = exact_matrix(P).inv()
+    squares = (arb(inverse[i, i]) * arb(level) for i in range(len(P)))
+    return np.array([float(square.sqrt().upper()) for square in squares]) * (1 + 1e-6)
 
 
 def _is_negative(P: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
