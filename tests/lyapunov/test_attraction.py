@@ -355,3 +355,31 @@ def test_a_point_on_the_way_is_named_as_what_is_missing():
     start, unsafe = Box.of(x1=(2, 2), x2=(0, 0)), Box.of(x1=(1, 1), x2=(0, 0))
     found = barrier(lambda x: (-x[0], -x[1]), square_box(2, 3.0), start=start, unsafe=unsafe)
     assert str(found) == "undecided: not proved: B' < 0 where B = 0"
+
+
+def spiral(rate):
+    """V = x1^2 + x2^2 has V' = 2 rate V."""
+    return lambda x: (x[1] + rate * x[0], -x[0] + rate * x[1])
+
+
+@pytest.mark.parametrize("rate", [-1e-10, 1e-6, 0.0])
+def test_what_falls_slowly_is_not_refuted(rate):
+    """A margin of 1e-9 is asked for; where there is less of it V' < 0 is true, and undecided."""
+    given = {"box": square_box(2, 1.0), "level": 0.9, "floor": 0.1}
+    found = prove_decrease(lambda x: x[0] ** 2 + x[1] ** 2, spiral(rate), **given)
+    assert found.status == ("undecided" if rate < 0 else "refuted")
+    x = np.array([found.where[name] for name in ("x1", "x2")])
+    assert abs(found.value - 2 * rate * x @ x) <= 1e-9 * abs(rate)
+
+
+def test_a_refuted_level_has_a_point_where_v_does_not_fall():
+    """x' = a (x^3 - x) rises from 1 on, however slowly; V' > -1e-9 is no counterexample."""
+    for a in (1.0, 1e-3, 1e-6):
+        found = region_of_attraction(lambda x, a=a: (a * (x[0] ** 3 - x[0]),), square_box(1, 1.5),
+                                     P=[[1.0]])  # fmt: skip
+        assert found.level <= 1.0
+        if found.refuted is not None:
+            assert abs(found.refuted["x1"]) >= 1.0
+            assert "V' >= 0 at a point" in found.reason
+        else:
+            assert "V' >= 0" not in found.reason

@@ -86,7 +86,7 @@ class ProvedLevel:
     floor: float  # below it the linear part decides
     # a level that is not proved, as near as was asked for; that of the box where all below is
     above: float
-    refuted: np.ndarray | None  # a point with V' >= -1e-9 and V <= `above`
+    refuted: np.ndarray | None  # a point with V' >= 0, to rounding, and V <= `above`
     boxes: int
     reason: str  # why there is nothing beyond `level`
 
@@ -114,8 +114,7 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
         if fall.holds:
             low = trial
         else:
-            high, refuted = trial, fall.point[: V.motion.order] if fall.holds is False else None
-            reason = "V' >= 0 at a point" if fall.holds is False else "undecided: raise max_boxes"
+            high, (refuted, reason) = trial, _not_proved(V, fall, trial, floor, box, max_boxes)
         if low >= fits or high - low <= tol * low:
             break
         trial = 0.5 * (low + high) if high < 4 * low else float(np.sqrt(low * high))
@@ -125,10 +124,30 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
     )
 
 
-def _fall(V: Quadratic, level: float, floor: float, box: Box, max_boxes: int) -> BoxVerdict:
+def _fall(
+    V: Quadratic, level: float, floor: float, box: Box, max_boxes: int, bound: float = 0.0
+) -> BoxVerdict:
     """Return whether V' < 0 between two levels, on the box: it holds the level set."""
     low, high = np.append(box.low, [level, floor]), np.append(box.high, [level, floor])
-    return decide_claim(V.falls, low, high, 0.0, max_boxes=max_boxes)
+    return decide_claim(V.falls, low, high, bound, max_boxes=max_boxes)
+
+
+def _not_proved(
+    V: Quadratic, fall: BoxVerdict, level: float, floor: float, box: Box, max_boxes: int
+) -> tuple[np.ndarray | None, str]:
+    """Return a point where V does not fall, if there is one, and what is to be said of a level."""
+    if fall.holds is None:
+        return None, "undecided: raise max_boxes"
+    n, there = V.motion.order, fall.point[None]
+    least, most = (ends[0, 0] for ends in V.falls.values(there, there))  # of V' + 1e-9
+    if least >= _STRICT:
+        return fall.point[:n], "V' >= 0 at a point"
+    rises = _fall(V, level, floor, box, max_boxes, _STRICT)  # a point where V' > 0
+    if rises.holds is False:
+        return rises.point[:n], "V' >= 0 at a point"
+    if most < _STRICT:
+        return None, "undecided: V' is above -1e-9 at a point, and below 0: scale P up"
+    return fall.point[:n], "V' is 0 to rounding at a point"
 
 
 def _holds(V: Quadratic, level: float, box: Box) -> bool:
