@@ -363,7 +363,6 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
         if coefficients is None:
             return none, boxes, f"no polynomial keeps samples apart: {reason or 'raise degree'}"
         if _mistakes(problem, coefficients):
-            reason = problem.claims[-1].what
             continue
         reason = ""
         for claim in problem.claims:
@@ -377,7 +376,7 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
             problem.samples[claim.kind] = np.concatenate([points, added[None]])
         if not reason:
             return coefficients, boxes, ""
-    return none, boxes, f"not proved: {reason}"
+    return none, boxes, f"not proved: {reason or problem.claims[-1].what}"  # what mistakes are of
 
 
 def _mistakes(problem: _Problem, coefficients: np.ndarray) -> bool:
