@@ -95,8 +95,8 @@ def enclosed(
     results: Sequence[Expr], sides: int, fixed: int = 0, *, all_exist: bool = False
 ) -> BoxCode:
     """Make the machine code that encloses functions of a box."""
-    # Whether none has a bound where one of them is no number, as the least of numbers has none; of
-    # conditions that are not to hold at once one that surely does not is enough.
+    # If all exist, nothing is bounded where one has no value: the least of numbers has none there.
+    # Of conditions that are not to hold at once it is enough that one surely does not.
     with np.errstate(all="ignore"):  # of constants
         graph, numbers = scalar_expressions(results)
         gradients = [_gradient(graph, expr, sides, fixed) for expr in numbers]
