@@ -19,7 +19,7 @@ from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
-from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
+from nlctl.native.enclosures.divide import decide_claim
 from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
@@ -366,7 +366,10 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
             continue
         reason = ""
         for claim in problem.claims:
-            decision = _decided(claim, coefficients, max_boxes)
+            decision = decide_claim(
+                claim.code, claim.box.low, claim.box.high, 0.0, max_boxes=max_boxes,
+                numbers=coefficients,
+            )  # fmt: skip
             boxes += decision.boxes
             if decision.holds:
                 continue
@@ -388,11 +391,6 @@ def _mistakes(problem: _Problem, coefficients: np.ndarray) -> bool:
     inside = problem.samples["inside"]
     problem.samples["inside"] = np.concatenate([inside, problem.pool[chosen]])
     return bool(len(wrong))
-
-
-def _decided(claim: _Claim, coefficients: np.ndarray, max_boxes: int) -> BoxVerdict:
-    low, high = (np.append(side, coefficients) for side in (claim.box.low, claim.box.high))
-    return decide_claim(claim.code, low, high, 0.0, max_boxes=max_boxes)
 
 
 def _monomials(z: np.ndarray, terms: Sequence[Term]) -> np.ndarray:

@@ -12,7 +12,7 @@ from nlctl.expressions.graph import Expr, Graph
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 
-from ...intervals.box import Box
+from ...intervals.box import Box, face_of_box
 from ...intervals.exact_matrices import exact_matrix, is_positive_definite
 from .motion import StateRates
 
@@ -128,8 +128,8 @@ def _fall(
     V: Quadratic, level: float, floor: float, box: Box, max_boxes: int, bound: float = 0.0
 ) -> BoxVerdict:
     """Return whether V' < 0 between two levels, on the box: it holds the level set."""
-    low, high = np.append(box.low, [level, floor]), np.append(box.high, [level, floor])
-    return decide_claim(V.falls, low, high, bound, max_boxes=max_boxes)
+    numbers = level, floor
+    return decide_claim(V.falls, box.low, box.high, bound, max_boxes=max_boxes, numbers=numbers)
 
 
 def _not_proved(
@@ -154,9 +154,12 @@ def _holds(V: Quadratic, level: float, box: Box) -> bool:
     """Whether V > level on every face of a box, so that nothing leaves the level set there."""
     for i in range(V.motion.order):
         for end in box.cell[i]:
-            low, high = (np.append(side, [level, 0.0]) for side in (box.low, box.high))
-            low[i] = high[i] = end
-            if not decide_claim(V.inside, low, high, 0.0, max_boxes=_FACE).holds:
+            ends = face_of_box(box, i, end)
+            numbers = level, 0.0
+            face = decide_claim(
+                V.inside, ends.low, ends.high, 0.0, max_boxes=_FACE, numbers=numbers
+            )
+            if not face.holds:
                 return False
     return True
 
