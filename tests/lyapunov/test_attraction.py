@@ -241,6 +241,7 @@ def test_prajnas_example_is_safe(start, unsafe):
     """For all time, from both sides of a saddle, by a polynomial of degree four in all of space."""
     found = barrier(saddles, EVERYWHERE, start=start, unsafe=unsafe, degree=4)
     assert (found.status, found.arithmetic) == ("proved", "rational numbers")
+    assert found.claim == "safe as long as solutions exist"  # beyond the saddles they escape
     rng = np.random.default_rng(0)
     for angle in rng.uniform(0, 2 * np.pi, 12):
         x = 1.5 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)
@@ -383,3 +384,14 @@ def test_a_refuted_level_has_a_point_where_v_does_not_fall():
             assert "V' >= 0 at a point" in found.reason
         else:
             assert "V' >= 0" not in found.reason
+
+
+@pytest.mark.parametrize("lost", [
+    lambda x: np.sqrt(np.abs(x[0]) - 0.05), lambda x: 0.01 * x[0] / (x[0] - 0.1) ** 2,
+])  # fmt: skip
+def test_nothing_is_safe_that_comes_to_where_rates_have_no_value(lost):
+    """From 0.3 to 0.05, or to a pole at 0.1, which is within any set around the equilibrium."""
+    sets = {"start": Box.of(x1=(0.2, 0.4)), "unsafe": Box.of(x1=(0.6, 1))}
+    assert barrier(lambda x: (-x[0],), square_box(1, 1.0), **sets).claim == "safe for all time"
+    found = barrier(lambda x: (-x[0] - lost(x),), square_box(1, 1.0), **sets)
+    assert found.status == "undecided"
