@@ -74,7 +74,18 @@ class Ball(NumPyFunctions):
         self.not_negative = not_negative or bool(value >= 0)
 
     def known_not_negative(self, is_known: bool = True) -> Ball:
-        """Return the ball with what is known of its sign besides its ends."""
+        """Return the ball with what is known of its sign besides its ends.
+
+        Parameters
+        ----------
+        is_known : bool, optional
+            Whether no value is below 0.
+
+        Returns
+        -------
+        Ball
+            The same where nothing is new.
+        """
         return Ball(self.value, self.gradient, True) if is_known and not self.not_negative else self
 
     def __repr__(self) -> str:
@@ -88,7 +99,20 @@ class Ball(NumPyFunctions):
         return repr(self)
 
     def chain(self, value: arb, slope: arb) -> Ball:
-        """Return `value` of phi with the derivatives of self times `slope`, that of phi."""
+        """Return `value` with the derivatives of self times `slope`.
+
+        Parameters
+        ----------
+        value : arb
+            Enclosure of phi of the ball.
+        slope : arb
+            Enclosure of the derivative of phi.
+
+        Returns
+        -------
+        Ball
+            With as many derivatives.
+        """
         return Ball(value, tuple(slope * g for g in self.gradient))
 
     def _joined(self, value: arb, by_self: Any, other: Ball, by_other: Any) -> Ball:
@@ -139,13 +163,35 @@ class Ball(NumPyFunctions):
         return self.maximum(-self).known_not_negative()
 
     def minimum(self, other: Ball) -> Ball:
-        """Smaller one, enclosing both where balls overlap: the derivative is one or the other."""
+        """Smaller one; where balls overlap, the derivative is one or the other.
+
+        Parameters
+        ----------
+        other : Ball or float
+            What it is compared with.
+
+        Returns
+        -------
+        Ball
+            Encloses both where they overlap.
+        """
         other = as_ball(other)
         both = self.not_negative and other.not_negative
         return self._extreme(other, arb.min).known_not_negative(both)
 
     def maximum(self, other: Ball) -> Ball:
-        """Larger one, enclosing both where balls overlap: the derivative is one or the other."""
+        """Larger one; where balls overlap, the derivative is one or the other.
+
+        Parameters
+        ----------
+        other : Ball or float
+            What it is compared with.
+
+        Returns
+        -------
+        Ball
+            Encloses both where they overlap.
+        """
         other = as_ball(other)
         either = self.not_negative or other.not_negative
         return self._extreme(other, arb.max).known_not_negative(either)
@@ -163,9 +209,18 @@ class Ball(NumPyFunctions):
         return Ball(low.union(high), gradient)
 
     def apply(self, name: str) -> Ball:
-        """Return phi of the ball for the NumPy function of that name, or ``sinc``.
+        """Return phi of the ball for the NumPy function of that name.
 
-        Where it jumps within the ball the derivatives have no bound.
+        Parameters
+        ----------
+        name : str
+            A function of the table that has an enclosure, such as ``sin``; or ``sinc``.
+
+        Returns
+        -------
+        Ball
+            With the derivatives by the chain rule; where it jumps within the ball they have no
+            bound.
         """
         if name == "sinc":
             return self._sinc()
@@ -202,7 +257,20 @@ class Ball(NumPyFunctions):
         return self.chain(value, common(slope, bound))
 
     def pair(self, name: str, other: Ball) -> Any:
-        """Return phi of this and another number, for a function of `pairs`."""
+        """Return phi of this ball and another one, for the NumPy function of that name.
+
+        Parameters
+        ----------
+        name : str
+            A function of `nlctl.analysis.intervals.pairs`.
+        other : Ball or float
+            The second argument.
+
+        Returns
+        -------
+        Ball
+            Where the function may jump, with derivatives without bound.
+        """
         other = as_ball(other)
         if other is NotImplemented:
             return other
@@ -215,12 +283,34 @@ class Ball(NumPyFunctions):
         return result.known_not_negative(name in ("hypot", "power"))  # a real power has no sign
 
     def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Ball:
-        """Return the linear interpolation of a table; at break points derivatives of both sides."""
+        """Return the linear interpolation of a table, constant beyond its ends.
+
+        Parameters
+        ----------
+        xp, fp : tuple of m floats
+            Increasing break points, and the values there.
+
+        Returns
+        -------
+        Ball
+            At break points the derivatives enclose those of both sides.
+        """
         return self.chain(*enclosed_table(self.value, xp, fp))
 
     @staticmethod
     def lifted(number: object) -> Any:
-        """Return a number as a ball, and NotImplemented for what is not a number."""
+        """Return a number as a ball.
+
+        Parameters
+        ----------
+        number : float or Ball
+            What is computed with.
+
+        Returns
+        -------
+        Ball
+            NotImplemented for what is not a number.
+        """
         return as_ball(number)
 
     def _compared(self, order: str, other: Ball) -> Any:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 
-_UP, _DOWN = (Context(prec=6, rounding=side) for side in (ROUND_CEILING, ROUND_FLOOR))
+
+def text_above(number: float | Fraction, digits: int = 6) -> str:
+    """Return the first digits of a number, rounded up: of an upper bound."""
+    return _text(number, Context(prec=digits, rounding=ROUND_CEILING))
 
 
-def text_above(number: float | Fraction) -> str:
-    """Return six digits of a number, rounded up: of an upper bound."""
-    return _text(number, _UP)
-
-
-def text_below(number: float | Fraction) -> str:
-    """Return six digits of a number, rounded down: of a lower bound, or of a proved set."""
-    return _text(number, _DOWN)
+def text_below(number: float | Fraction, digits: int = 6) -> str:
+    """Return the first digits of a number, rounded down: of a lower bound, or of a proved set."""
+    return _text(number, Context(prec=digits, rounding=ROUND_FLOOR))
 
 
 def exact_text(number: float | Fraction) -> str:
@@ -25,7 +23,7 @@ def exact_text(number: float | Fraction) -> str:
 
 def _text(number: float | Fraction, rounded: Context) -> str:
     if isinstance(number, Fraction):
-        digits = rounded.divide(Decimal(number.numerator), Decimal(number.denominator))
+        moved = rounded.divide(Decimal(number.numerator), Decimal(number.denominator))
     else:  # 0.1 is the float of that name
-        digits = rounded.plus(Decimal(repr(float(number))))
-    return f"{float(digits):.6g}"
+        moved = rounded.plus(Decimal(repr(float(number))))
+    return f"{float(moved):.{rounded.prec}g}"
