@@ -161,6 +161,13 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     )
 
 
+def enclose_relatively(function: _Function, box: Box, tol: float, max_boxes: int) -> Range:
+    """Enclose a range to a tolerance relative to what one box says of |f|."""
+    rough = enclose(function, box, max_boxes=1).magnitude
+    fineness = tol * rough if 0 < rough < np.inf else tol
+    return enclose(function, box, tol=fineness, max_boxes=max_boxes)
+
+
 @as_annotated
 def prove(
     function: _Function,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from flint import arb
+from flint import arb, ctx
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, of_type
@@ -27,6 +28,7 @@ from .paths import Undecided
 from .rates import Rate, as_rate
 
 STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9
+_DIGITS = 400  # binary ones, of V' at a point
 _SAME = 1e-9  # relative: between a gradient that is given and the derivatives of V
 _FACE = 20_000  # boxes on a face of the box
 Scalar = Callable[[tuple[Any, ...]], Any]
@@ -70,7 +72,8 @@ def prove_decrease(
     Returns
     -------
     Proof
-        If it is refuted, `where` is a point in the set with V' > -1e-9.
+        Proved is V' <= -1e-9.  If it is refuted, `where` is a point in the set with V' >= 0, and
+        `value` is V' there; where V' is between these, it is undecided.
 
     Raises
     ------
@@ -110,20 +113,42 @@ def prove_decrease(
     if open_face is not None:
         return open_face
 
-    def least(x: tuple[Any, ...]) -> Any:
+    def along(x: tuple[Any, ...]) -> Rate:
         rates = rhs(x)
         if len(rates) != len(box.names):
             raise ParameterError(f"rhs gives {_of_states(len(rates), 'rate', box)}")
         if given is not None:
             _check_gradient(V, given, x, box)
-        V_x = as_rate(V(tuple(map(Rate, map(as_ball, x), map(as_ball, rates)))))
+        return as_rate(V(tuple(map(Rate, map(as_ball, x), map(as_ball, rates)))))
+
+    def least(x: tuple[Any, ...]) -> Any:
+        V_x = along(x)
         return np.minimum(V_x.rate + STRICT, np.minimum(high - V_x.here, V_x.here - low))
 
     # Positive where a point inside the level set has V' > -STRICT, and nowhere else.
     claim: Any = least
     if given is None:
         claim = Readable(of_balls=least, expressions=partial(_conditions, *plain, low, high))
-    return prove(claim, box, high=0.0, max_boxes=max_boxes)
+    proof = _with_the_rate(prove(claim, box, high=0.0, max_boxes=max_boxes), along)
+    if proof.holds is None and proof.value < 0:  # V' is nearly 0 somewhere; is it above it, too?
+        rises = _with_the_rate(prove(claim, box, high=STRICT, max_boxes=max_boxes), along)
+        proof = rises if rises.holds is False else proof
+    return proof
+
+
+def _with_the_rate(proof: Proof, along: Callable[[tuple[Any, ...]], Rate]) -> Proof:
+    """Return V' with the point that refutes; where it lies between -STRICT and 0, none does."""
+    if proof.holds is not False:
+        return proof
+    with ctx.workprec(_DIGITS):
+        x = tuple(Ball(arb(v)) for v in (proof.where or {}).values())
+        try:
+            rate = as_ball(along(x).rate).value
+        except Undecided:
+            return replace(proof, value=np.nan)
+    if rate < 0:
+        return replace(proof, holds=None, undecided=1, value=float(rate.mid()))
+    return replace(proof, value=max(float(rate.mid()), 0.0))
 
 
 def _conditions(

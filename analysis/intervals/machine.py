@@ -96,7 +96,7 @@ def _generated(function: Readable, sides: int, sign: int) -> BoxCode | None:
         graph, results = function.read[sides]
         if len(results) > 1:
             return enclosed(results, sides)
-        return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
+        return enclosed(_apart(graph, graph.number(results[0]), sign), sides, all_exist=True)
     except (Untraceable, CompileError):  # the latter where the C library lacks a function
         return None
 
@@ -142,6 +142,5 @@ def _point(box: Box, k: int) -> list[float]:
 
 def decided_by_code(code: BoxCode, box: Box, bound: float, max_boxes: int) -> BoxVerdict:
     """Return the verdict on a claim; the same whatever the number of processors."""
-    low, high = np.array([box.low, box.high], dtype=float)
     threads = os.cpu_count() or 1
-    return decide_claim(code, low, high, bound, max_boxes=max_boxes, threads=threads)
+    return decide_claim(code, box.low, box.high, bound, max_boxes=max_boxes, threads=threads)

@@ -15,7 +15,7 @@ from nlctl.attributes import described_record
 from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
-from .bounds.final_bound import KAPPA, initial_V
+from .bounds.final_bound import KAPPA
 from .bounds.weights import Network, tightest_weights
 from .constants import Constants
 from .examination import Examination, examine
@@ -209,8 +209,7 @@ def _shares_of(rows: Iterable[tuple[str, str, Any]], whole: object) -> tuple[Sha
 
 def _bound_with(given: Premises, delta: float, W: np.ndarray, Q: float) -> float:
     changed = dataclasses.replace(given, delta=delta, W=W)
-    error = W - np.array(given.gains.W_hat_0)
-    return changed.C_0(float(initial_V(given.gains, delta, float(error @ error))), Q)
+    return changed.C_0(changed.V_0, Q)
 
 
 def _fitted(s: Signals, given: Premises, Q: float) -> float:

@@ -17,7 +17,7 @@ from ..intervals.arithmetic import as_ball
 from ..intervals.box import Box
 from ..intervals.branch_and_bound import enclose, upper
 from .bounds.decomposition import Decomposition
-from .bounds.final_bound import Gains, alpha_0, alpha_1, total_error
+from .bounds.final_bound import Gains, alpha_0, alpha_1, initial_V, total_error
 from .constants import Constants, bound
 from .loop.integral import sharpest
 
@@ -48,6 +48,12 @@ class Premises:
     def alpha_1(self) -> float:
         """Rate of (31)."""
         return alpha_1(self.gains)
+
+    @property
+    def V_0(self) -> float:  # noqa: N802
+        """V(0) of (21), from where the controller starts."""
+        error = self.W - np.array(self.gains.W_hat_0)
+        return float(initial_V(self.gains, self.delta, float(error @ error)))
 
     def C_0(self, V_0: float, Q: float) -> float:  # noqa: N802
         """C_0 of (36).

@@ -19,6 +19,7 @@ from fractions import Fraction
 from typing import Any
 
 from .content import FORMAT, Record, Refuted, need, seal_of
+from .digits import exact_text, text_above
 from .filtered import filter_text, known_sign_bounds, sliding_mode_bounds
 from .reference_model import model_text, reference_model_bounds
 
@@ -75,10 +76,11 @@ def recheck(content: Any) -> str:
     need([whole["format"], whole["version"]] == FORMAT, "the format is another one")
     need(whole["seal"] == seal_of(content), "the file was changed after it was written")
     bounds, claim = proved_bounds(content), whole.record("claim")
+    need(bool(claim.content), "nothing is claimed")
     need(set(claim.content) <= set(bounds), "a bound is claimed that is not proved")
     for name in claim.content:
-        need(bounds[name] <= claim.number(name), f"{name} <= {float(claim.number(name)):.6g}")
-    said = ", ".join(f"{name} <= {float(claim.number(name)):.6g}" for name in claim.content)
+        need(bounds[name] <= claim.number(name), f"{name} <= {exact_text(claim.number(name))}")
+    said = ", ".join(f"{name} <= {text_above(claim.number(name))}" for name in claim.content)
     return f"{said}; for all t >= 0 from {RECHECKED[whole['kind']][1](whole)}"
 
 

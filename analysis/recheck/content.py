@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from .digits import exact_text
 from .integers import Interval
 
 FORMAT = ["nlctl certificate", 1]
@@ -102,9 +103,9 @@ def begins(starts: Record, open_ended: bool = False) -> str:
     """Return in words from where a loop starts; what is not named starts at 0, or anywhere."""
     sides = {name: starts.interval(name) for name in starts.content}
     named = [
-        f"{name}(0) = {float(x.top):.6g}"
+        f"{name}(0) = {exact_text(x.top)}"
         if x.low == x.high
-        else f"{name}(0) in [{float(x.bottom):.6g}, {float(x.top):.6g}]"
+        else f"{name}(0) in [{exact_text(x.bottom)}, {exact_text(x.top)}]"
         for name, x in sides.items()
         if x.low or x.high or open_ended
     ]
@@ -128,9 +129,9 @@ def states_text(premise: Record, parts: Sequence[str]) -> str:
 
 def split_text(split: Record) -> str:
     """Return in words what the actuator is."""
-    how_far = "all u" if split["range"] is None else f"|u| <= {float(split.number('range')):.6g}"
-    k_1, k_2, eps = (float(split.number(name)) for name in ("k_1", "k_2", "eps"))
-    return f"v = k u + eps_u with {k_1:.6g} <= k <= {k_2:.6g}, |eps_u| <= {eps:.6g} for {how_far}"
+    how_far = "all u" if split["range"] is None else f"|u| <= {exact_text(split.number('range'))}"
+    k_1, k_2, eps = (exact_text(split.number(name)) for name in ("k_1", "k_2", "eps"))
+    return f"v = k u + eps_u with {k_1} <= k <= {k_2}, |eps_u| <= {eps} for {how_far}"
 
 
 def seal_of(content: Mapping[str, Any]) -> str:

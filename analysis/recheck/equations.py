@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from .content import need, read_rational
+from .digits import exact_text
 from .integers import KNOWN_FUNCTIONS, UNITY, ZERO, Interval
 
 _INF = math.inf
@@ -80,7 +81,7 @@ class WrittenEquation:
         texts: list[str] = []
         for operation, *given in self.nodes:
             if operation == "number":
-                texts.append(f"{float(read_rational(given[0])):.6g}")
+                texts.append(exact_text(read_rational(given[0])))
             elif operation == "symbol":
                 texts.append(given[0])
             elif operation == "power":

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from .content import Record, begins, need, read_rational, read_split, split_text, states_text
+from .digits import exact_text
 from .equations import WrittenEquation, stays
 from .integers import ALL, PI_ENCLOSED, TWO, ZERO, Interval, absolute, sqrt
 
@@ -110,10 +111,10 @@ def filter_text(whole: Record) -> str:
     """Return the starts, and what the reader compares with his loop, in words."""
     premise = whole.record("premises")
     gains, lambdas = premise.record("gains"), premise.numbers("lambdas")
-    numbers = ", ".join(f"{name} = {float(gains.number(name)):.6g}" for name in gains.content)
+    numbers = ", ".join(f"{name} = {exact_text(gains.number(name))}" for name in gains.content)
     states = ("plant", *(part for part in ("weights", "delta_hat") if part in premise.content))
     sines = (
-        f"{float(a):.6g} sin({float(w):.6g} t + {float(c):.6g})" for a, w, c in _sines(premise)
+        f"{exact_text(a)} sin({exact_text(w)} t + {exact_text(c)})" for a, w, c in _sines(premise)
     )
     return (
         f"{begins(premise.record('starts'))}. Premises: {whole['kind']}; "

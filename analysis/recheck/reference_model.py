@@ -15,10 +15,12 @@ from fractions import Fraction
 from typing import Any
 
 from .content import Record, begins, need, read_split, split_text, states_text
+from .digits import exact_text
 from .equations import WrittenEquation, stays
 from .integers import ALL, ZERO, Interval, absolute, sqrt
 from .products import as_equation, multiplied_out, one_symbol, plus
 
+_FEEDBACK = "(b yd - a^T xm - K^T E - W_hat^T psi)"
 _Numbers = Sequence[Fraction]
 _Fall = tuple[Fraction, Fraction]  # bounds of V for all time, and of E^T P E in the end
 
@@ -250,10 +252,13 @@ def model_text(whole: Record) -> str:
     numbers = ", ".join(f"{name} = {row}" for name, row in rows)
     psi = ", ".join(str(WrittenEquation(nodes)) for nodes in premise.listed("regressor"))
     parameters = {name: law[name] for name in law.content if name != "kind"}
-    listed = ", ".join(f"{name} = {float(law.number(name)):.6g}" for name in parameters)
-    gain = "-W_hat^T psi" if premise["gain"] is None else (
-        f"(b yd - a^T xm - K^T E - W_hat^T psi) / {float(premise.number('gain')):.6g}")  # fmt: skip
-    level = "" if premise["level"] is None else f"V(0) <= {float(premise.number('level')):.6g}, "
+    listed = ", ".join(f"{name} = {exact_text(law.number(name))}" for name in parameters)
+    gain = (
+        "-W_hat^T psi"
+        if premise["gain"] is None
+        else f"{_FEEDBACK} / {exact_text(premise.number('gain'))}"
+    )
+    level = "" if premise["level"] is None else f"V(0) <= {exact_text(premise.number('level'))}, "
     if level:
         error, W = whole.record("proof").record("error"), whole.record("proof").numbers("W")
         level += f"V of P = {[float(x) for x in error.numbers('P')]}, W = {[float(x) for x in W]}, "
@@ -261,6 +266,6 @@ def model_text(whole: Record) -> str:
         f"{level}{begins(premise.record('starts'), bool(level))}. Premises: {whole['kind']}; "
         f"{states_text(premise, ('plant', 'model', 'W_hat'))}; "
         f"x{n}' = {WrittenEquation(premise['equation'])}; u = {gain}; psi = [{psi}]; {numbers}, "
-        f"b = {float(premise.number('b')):.6g}; |yd| <= {float(premise.number('command')):.6g}; "
+        f"b = {exact_text(premise.number('b'))}; |yd| <= {exact_text(premise.number('command'))}; "
         f"{split_text(premise.record('actuator'))}; {law['kind']}: {listed}"
     )

@@ -1,5 +1,7 @@
 """Regions of attraction and barriers: closed forms, published levels, and trajectories."""
 
+from fractions import Fraction
+
 import control as ct
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 import nlctl
 from nlctl.analysis.intervals.machine import only_balls
 from nlctl.analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
+from nlctl.analysis.lyapunov.attraction.level import reach_of_level
 from nlctl.analysis.lyapunov.attraction.squares import PositiveCondition, positive_where
 from nlctl.errors import ParameterError
 
@@ -238,6 +241,7 @@ def test_prajnas_example_is_safe(start, unsafe):
     """For all time, from both sides of a saddle, by a polynomial of degree four in all of space."""
     found = barrier(saddles, EVERYWHERE, start=start, unsafe=unsafe, degree=4)
     assert (found.status, found.arithmetic) == ("proved", "rational numbers")
+    assert found.claim == "safe as long as solutions exist"  # beyond the saddles they escape
     rng = np.random.default_rng(0)
     for angle in rng.uniform(0, 2 * np.pi, 12):
         x = 1.5 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)
@@ -314,3 +318,80 @@ def test_integers_that_are_given_steer_what_is_proved():
         assert barrier(loop, box, params={"n": n}, **far).status == status
     run = nlctl.input_output_response(loop, np.linspace(0, 4, 41), 0, [1.0, 0.0], params={"n": 4})
     assert run.states.min() < -0.95
+
+
+def test_a_set_that_is_proved_is_not_larger_in_words():
+    """A level is rounded down, and what is not proved beyond it up; the box's own is no refuted."""
+    found = region_of_attraction(van_der_pol, square_box(2, 3.0), P=KHALIL)
+    first, _, rest = str(found).removeprefix("V <= ").partition(" proved on ")
+    assert 0 <= found.level - float(first) <= 1e-5
+    assert float(rest.partition("; ")[2].partition(" is not")[0]) >= found.above
+    assert f"V <= {first} everything" in found.claim
+    whole = region_of_attraction(cube, square_box(1, 1.0), P=[[1.0]])
+    assert whole.level == whole.above
+    assert "more is not: the box: take a larger one" in str(whole)
+
+
+@pytest.mark.parametrize("seed", [4, 16, 35])
+def test_an_ellipsoid_reaches_no_less_far_than_it_is_said(seed):
+    """(P^-1)_ii exactly; that of floats is 1e-5 less for such P."""
+    rng = np.random.default_rng(seed)
+    Q = np.linalg.qr(rng.standard_normal((2, 2)))[0]
+    P = Q @ np.diag([1.0, 1e-12]) @ Q.T
+    P = 0.5 * (P + P.T)
+    (a, b), (_, c) = [[Fraction(float(v)) for v in row] for row in P]
+    for reach, square in zip(reach_of_level(P, 0.3), (c, a), strict=True):
+        assert Fraction(float(reach)) ** 2 >= Fraction(0.3) * square / (a * c - b * b)
+
+
+@pytest.mark.parametrize("P", [[[0.5, 1.5], [1.5, 4.5]], [[1.0, np.nan], [np.nan, 1.0]]])
+def test_a_matrix_that_floats_take_for_definite_is_refused(P):
+    """The first has the determinant 0 and, in floats, no eigenvalue that is not above it."""
+    with pytest.raises(ParameterError, match="positive definite"):
+        region_of_attraction(lambda x: (-x[0], -x[1]), square_box(2, 1.0), P=P)
+
+
+def test_a_point_on_the_way_is_named_as_what_is_missing():
+    """No barrier is between a start and a point that it comes to."""
+    start, unsafe = Box.of(x1=(2, 2), x2=(0, 0)), Box.of(x1=(1, 1), x2=(0, 0))
+    found = barrier(lambda x: (-x[0], -x[1]), square_box(2, 3.0), start=start, unsafe=unsafe)
+    assert str(found) == "undecided: not proved: B' < 0 where B = 0"
+
+
+def spiral(rate):
+    """V = x1^2 + x2^2 has V' = 2 rate V."""
+    return lambda x: (x[1] + rate * x[0], -x[0] + rate * x[1])
+
+
+@pytest.mark.parametrize("rate", [-1e-10, 1e-6, 0.0])
+def test_what_falls_slowly_is_not_refuted(rate):
+    """A margin of 1e-9 is asked for; where there is less of it V' < 0 is true, and undecided."""
+    given = {"box": square_box(2, 1.0), "level": 0.9, "floor": 0.1}
+    found = prove_decrease(lambda x: x[0] ** 2 + x[1] ** 2, spiral(rate), **given)
+    assert found.status == ("undecided" if rate < 0 else "refuted")
+    x = np.array([found.where[name] for name in ("x1", "x2")])
+    assert abs(found.value - 2 * rate * x @ x) <= 1e-9 * abs(rate)
+
+
+def test_a_refuted_level_has_a_point_where_v_does_not_fall():
+    """x' = a (x^3 - x) rises from 1 on, however slowly; V' > -1e-9 is no counterexample."""
+    for a in (1.0, 1e-3, 1e-6):
+        found = region_of_attraction(lambda x, a=a: (a * (x[0] ** 3 - x[0]),), square_box(1, 1.5),
+                                     P=[[1.0]])  # fmt: skip
+        assert found.level <= 1.0
+        if found.refuted is not None:
+            assert abs(found.refuted["x1"]) >= 1.0
+            assert "V' >= 0 at a point" in found.reason
+        else:
+            assert "V' >= 0" not in found.reason
+
+
+@pytest.mark.parametrize("lost", [
+    lambda x: np.sqrt(np.abs(x[0]) - 0.05), lambda x: 0.01 * x[0] / (x[0] - 0.1) ** 2,
+])  # fmt: skip
+def test_nothing_is_safe_that_comes_to_where_rates_have_no_value(lost):
+    """From 0.3 to 0.05, or to a pole at 0.1, which is within any set around the equilibrium."""
+    sets = {"start": Box.of(x1=(0.2, 0.4)), "unsafe": Box.of(x1=(0.6, 1))}
+    assert barrier(lambda x: (-x[0],), square_box(1, 1.0), **sets).claim == "safe for all time"
+    found = barrier(lambda x: (-x[0] - lost(x),), square_box(1, 1.0), **sets)
+    assert found.status == "undecided"

@@ -255,3 +255,33 @@ def test_numbers_of_numpy_on_the_left_of_a_ball():
     assert jumps.value.contains(2)
     assert not jumps.gradient[0].is_finite()
     assert np.floor(Ball(arb(1.25))).value == arb(1)
+
+
+PARTLY_NO_NUMBERS = {
+    "the smaller of a root": (lambda x: np.minimum(np.sqrt(x[0]), 1.0), {"x": (-1, 1)}),
+    "the smaller of a root and of another side": (
+        lambda x: np.minimum(np.minimum(x[1], np.sqrt(x[0])), 2.0), {"x": (-1, 1), "y": (0, 1)}),
+    "the larger of a logarithm": (lambda x: np.maximum(np.log(x[0]), 0.0), {"x": (-1, 1)}),
+    "the smaller, as Python has it": (lambda x: min(np.sqrt(x[0]), 1.0), {"x": (-1, 1)}),
+    "0 log(0)": (lambda x: x[0] * np.log(x[0]), {"x": (0, 4)}),
+    "a logarithm that begins at its pole": (lambda x: np.log(x[0]), {"x": (0, 4)}),
+}  # fmt: skip
+
+
+@each_row("function, sides", PARTLY_NO_NUMBERS.values(), ids=PARTLY_NO_NUMBERS)
+def test_nothing_is_proved_of_what_is_no_number_somewhere(function, sides):
+    """NaN is below no bound, and above none; a pole is no value."""
+    box = Box.of(**sides)
+    for claim in ({"high": 1e3}, {"low": -1e3}):
+        assert prove(function, box, **claim, max_boxes=2_000).status != "proved"
+    found = enclose(function, box, max_boxes=2_000)
+    assert (found.low, found.high) == (-np.inf, np.inf)
+
+
+def test_the_least_of_numbers_keeps_its_bounds():
+    """x^2 - x + 0.3 >= 0.05 has a root, which boxes show once they are small enough."""
+    box = Box.of(x=(0, 1), y=(0, 2))
+    least = lambda x: np.minimum(x[1], np.sqrt(x[0] * x[0] - x[0] + 0.3))  # noqa: E731
+    assert prove(least, box, high=0.56).holds
+    assert prove(least, box, low=-1e-9).holds
+    assert prove(least, box, high=0.54).holds is False

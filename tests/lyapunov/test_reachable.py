@@ -175,6 +175,36 @@ def test_what_has_no_value_is_undecided():
     assert found.status == "undecided"
 
 
+def angle_of_a_circle(x):
+    """Rates of a rotation, and of the integral of its angle."""
+    return -x[1], x[0], np.arctan2(x[1], x[0])
+
+
+def test_the_angle_jumps_at_its_cut():
+    """It is t until pi, so that its integral is t^2/2; then -pi, which no series sees."""
+    start = Box.of(x1=(1, 1), x2=(0, 0), x3=(0, 0))
+    before = reachable_set(angle_of_a_circle, start, 3.0)
+    assert before.status == "proved"
+    assert before.end_low[2] <= 4.5 <= before.end_high[2]
+    beyond = reachable_set(angle_of_a_circle, start, 4.0)
+    assert beyond.status == "undecided"
+    assert "no step is found beyond 3.14159 s" in beyond.reason
+
+
+def test_bounds_in_words_are_not_tighter_than_what_is_proved():
+    """1/e has more digits than six: the limit is said as it is, and no share is rounded to all."""
+    low = float(np.exp(-1)) * (1 - 1e-4)
+    found = reachable_set(lambda x: (-x[0],), Box.of(x=(1, 1)), 1.0, within=Box.of(x=(low, 2)))
+    assert found.status == "proved"
+    assert f"[{low!r}, 2]" in str(found)
+    touching = reachable_set(lambda x: (-x[0],), Box.of(x=(1, 1)), 1.0, within=Box.of(x=(0.1, 1)))
+    assert touching.status == "undecided"
+    assert "leave some room" in touching.reason
+    most = reachable_set(lambda x: (x[0] ** 2,), Box.of(x=(0.9, 1)), 1.0, max_pieces=40)
+    assert most.status == "undecided"
+    assert "99.9" in most.reason
+
+
 @pytest.mark.parametrize("function", [np.abs, np.floor, np.sign, lambda v: np.maximum(v, 0.1)])
 def test_rates_with_cases_are_refused(function):
     with pytest.raises(ParameterError, match="smooth"):

@@ -6,7 +6,7 @@ import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial, reduce
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
-from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
+from nlctl.native.enclosures.divide import decide_claim
 from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
@@ -30,6 +30,7 @@ from .everywhere import inequality_of, safe_everywhere
 from .motion import StateRates, motion_of
 from .squares import Term, monomial_terms
 
+_BOUND = 1e300  # of rates: below it they are numbers
 _STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
 _RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
 _ROUNDS = 60  # proposals for each of them
@@ -37,6 +38,7 @@ _SAMPLES = 300  # in each set
 _POOL = 20_000  # points of the box among which a proposal is looked for mistakes first
 _BAND = 0.02  # of the largest |B|, within which it counts as 0 there
 _ADDED = 40  # of these in a round
+_FALLS = "B' < 0 where B = 0"
 _StateFunction = Callable[[Any], Any]
 
 
@@ -44,7 +46,8 @@ _StateFunction = Callable[[Any], Any]
 class Barrier(ProofResult):
     """A polynomial B with B <= 0 at all starts, B > 0 in all that is unsafe, B' < 0 where B = 0.
 
-    No trajectory from a start comes to what is unsafe, or leaves the box, at any time.
+    No trajectory from a start comes to what is unsafe, or leaves the box, at any time.  In a box
+    all of them exist for all time; in all of space one may escape to infinity, safe until then.
     """
 
     names: tuple[str, ...]  # States.
@@ -58,7 +61,10 @@ class Barrier(ProofResult):
     @property
     def claim(self) -> str:
         """What is proved, in words."""
-        return "safe for all time" if self.holds else "no barrier is proved"
+        if not self.holds:
+            return "no barrier is proved"
+        bounded = bool(np.isfinite(self.box.cell).all())
+        return "safe for all time" if bounded else "safe as long as solutions exist"
 
     def value(self, x: Sequence[float]) -> float:
         """Return B at a state.
@@ -80,7 +86,7 @@ class Barrier(ProofResult):
         if not self.holds:
             return f"undecided: {self.reason}"
         how = f"on {counted(self.boxes, 'box', 'boxes')}" if self.boxes else "by sums of squares"
-        return f"safe for all time: proved {how}"
+        return f"{self.claim}: proved {how}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +164,8 @@ def barrier(
     In a box a polynomial B is proposed by linear programs on samples, B' + k B < 0 being linear in
     its coefficients: of points where the last proposal was 0 and rose.  What refutes a proposal
     becomes a sample of the next.  Proved is less than what is proposed: B <= 0 at the starts, B > 0
-    in what is unsafe and where trajectories leave the box, and B' < 0 where B = 0.
+    in what is unsafe and where trajectories leave the box, B' < 0 where B = 0, and that rates have
+    values where B <= 0.
 
     Where every side of the box is infinite, nothing is left: rates and sets have to be polynomials,
     and B <= 0, B > 0 and B' + k B < 0 everywhere are found as sums of squares, by one semidefinite
@@ -222,7 +229,7 @@ def barrier(
     ...     degree=4,
     ... )
     >>> print(found)
-    safe for all time: proved by sums of squares
+    safe as long as solutions exist: proved by sums of squares
     """
     box = of_type("barrier", "box", box, Box, "Box.of(x1=(-1, 1))")
     degree = integer("barrier", "degree", degree, at_least=1)
@@ -312,10 +319,11 @@ def _problem(
             what=f"B > 0 where {motion.names[i]} leaves the box",
             matters=lambda x, speed=speed, sign=sign: sign * speed(x),
         ))  # fmt: skip
-    claims.append(
-        _Claim(code=code(rises, *band), box=box, kind="inside", what="B' < 0 where B = 0")
-    )
+    claims.append(_Claim(code=code(rises, *band), box=box, kind="inside", what=_FALLS))
     _first_samples(problem)
+    size = reduce(partial(op, "add"), map(partial(op, "absolute"), rates[:n]))
+    exist = code(op("sub", size, graph.const(_BOUND)), op("neg", B))
+    claims.append(_Claim(code=exist, box=box, kind="unsafe", what="rates have values where B <= 0"))
     return problem
 
 
@@ -366,7 +374,10 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
             continue
         reason = ""
         for claim in problem.claims:
-            decision = _decided(claim, coefficients, max_boxes)
+            decision = decide_claim(
+                claim.code, claim.box.low, claim.box.high, 0.0, max_boxes=max_boxes,
+                numbers=coefficients,
+            )  # fmt: skip
             boxes += decision.boxes
             if decision.holds:
                 continue
@@ -376,7 +387,7 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
             problem.samples[claim.kind] = np.concatenate([points, added[None]])
         if not reason:
             return coefficients, boxes, ""
-    return none, boxes, f"not proved: {reason}"
+    return none, boxes, f"not proved: {reason or _FALLS}"  # what mistakes are of
 
 
 def _mistakes(problem: _Problem, coefficients: np.ndarray) -> bool:
@@ -388,11 +399,6 @@ def _mistakes(problem: _Problem, coefficients: np.ndarray) -> bool:
     inside = problem.samples["inside"]
     problem.samples["inside"] = np.concatenate([inside, problem.pool[chosen]])
     return bool(len(wrong))
-
-
-def _decided(claim: _Claim, coefficients: np.ndarray, max_boxes: int) -> BoxVerdict:
-    low, high = (np.append(side, coefficients) for side in (claim.box.low, claim.box.high))
-    return decide_claim(claim.code, low, high, 0.0, max_boxes=max_boxes)
 
 
 def _monomials(z: np.ndarray, terms: Sequence[Term]) -> np.ndarray:

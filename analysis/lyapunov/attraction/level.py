@@ -12,7 +12,8 @@ from nlctl.expressions.graph import Expr, Graph
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 
-from ...intervals.box import Box
+from ...intervals.box import Box, face_of_box
+from ...intervals.exact_matrices import exact_matrix, is_positive_definite
 from .motion import StateRates
 
 _STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
@@ -85,7 +86,7 @@ class ProvedLevel:
     floor: float  # below it the linear part decides
     # a level that is not proved, as near as was asked for; that of the box where all below is
     above: float
-    refuted: np.ndarray | None  # a point with V' >= -1e-9 and V <= `above`
+    refuted: np.ndarray | None  # a point with V' >= 0, to rounding, and V <= `above`
     boxes: int
     reason: str  # why there is nothing beyond `level`
 
@@ -97,8 +98,9 @@ class ProvedLevel:
 
 def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedLevel:
     """Return the largest level that is proved, to a relative tolerance."""
-    fits = V.largest_in(box) * _INSIDE
-    low, boxes = _floor(V, fits, box), 0
+    is_definite = is_positive_definite(exact_matrix(V.P))
+    fits = V.largest_in(box) * _INSIDE if is_definite else 0.0
+    low, boxes = _floor(V, fits, box) if is_definite else 0.0, 0
     nothing = {"V": V, "level": 0.0, "floor": low, "above": fits, "refuted": None}
     if low == 0.0:
         return ProvedLevel(**nothing, boxes=0, reason="the linear part decides nothing next to it")
@@ -112,8 +114,7 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
         if fall.holds:
             low = trial
         else:
-            high, refuted = trial, fall.point[: V.motion.order] if fall.holds is False else None
-            reason = "V' >= 0 at a point" if fall.holds is False else "undecided: raise max_boxes"
+            high, (refuted, reason) = trial, _not_proved(V, fall, trial, floor, box, max_boxes)
         if low >= fits or high - low <= tol * low:
             break
         trial = 0.5 * (low + high) if high < 4 * low else float(np.sqrt(low * high))
@@ -123,19 +124,42 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
     )
 
 
-def _fall(V: Quadratic, level: float, floor: float, box: Box, max_boxes: int) -> BoxVerdict:
+def _fall(
+    V: Quadratic, level: float, floor: float, box: Box, max_boxes: int, bound: float = 0.0
+) -> BoxVerdict:
     """Return whether V' < 0 between two levels, on the box: it holds the level set."""
-    low, high = np.append(box.low, [level, floor]), np.append(box.high, [level, floor])
-    return decide_claim(V.falls, low, high, 0.0, max_boxes=max_boxes)
+    numbers = level, floor
+    return decide_claim(V.falls, box.low, box.high, bound, max_boxes=max_boxes, numbers=numbers)
+
+
+def _not_proved(
+    V: Quadratic, fall: BoxVerdict, level: float, floor: float, box: Box, max_boxes: int
+) -> tuple[np.ndarray | None, str]:
+    """Return a point where V does not fall, if there is one, and what is to be said of a level."""
+    if fall.holds is None:
+        return None, "undecided: raise max_boxes"
+    n, there = V.motion.order, fall.point[None]
+    least, most = (ends[0, 0] for ends in V.falls.values(there, there))  # of V' + 1e-9
+    if least >= _STRICT:
+        return fall.point[:n], "V' >= 0 at a point"
+    rises = _fall(V, level, floor, box, max_boxes, _STRICT)  # a point where V' > 0
+    if rises.holds is False:
+        return rises.point[:n], "V' >= 0 at a point"
+    if most < _STRICT:
+        return None, "undecided: V' is above -1e-9 at a point, and below 0: scale P up"
+    return fall.point[:n], "V' is 0 to rounding at a point"
 
 
 def _holds(V: Quadratic, level: float, box: Box) -> bool:
     """Whether V > level on every face of a box, so that nothing leaves the level set there."""
     for i in range(V.motion.order):
         for end in box.cell[i]:
-            low, high = (np.append(side, [level, 0.0]) for side in (box.low, box.high))
-            low[i] = high[i] = end
-            if not decide_claim(V.inside, low, high, 0.0, max_boxes=_FACE).holds:
+            ends = face_of_box(box, i, end)
+            numbers = level, 0.0
+            face = decide_claim(
+                V.inside, ends.low, ends.high, 0.0, max_boxes=_FACE, numbers=numbers
+            )
+            if not face.holds:
                 return False
     return True
 
@@ -146,13 +170,21 @@ def _floor(V: Quadratic, fits: float, box: Box) -> float:
     # is negative definite for all of them.
     level = fits * 0.25
     while level > fits * _SMALLEST:
-        reach = np.sqrt(level * np.diag(np.linalg.inv(V.P))) * (1 + 1e-6)  # of the level set
+        reach = reach_of_level(V.P, level)
         low, high = np.maximum(V.at - reach, box.low), np.minimum(V.at + reach, box.high)
         ends = V.motion.slopes.values(low[None], high[None])
         if np.all(np.isfinite(ends)) and _is_negative(V.P, *(e[0] for e in ends)):
             return level
         level /= 4
     return 0.0
+
+
+def reach_of_level(P: np.ndarray, level: float) -> np.ndarray:
+    """Return how far z^T P z <= level reaches along each axis, and a little more: not less."""
+    # An inverse in floats may be off by more than any little.
+    inverse = exact_matrix(P).inv()
+    squares = (arb(inverse[i, i]) * arb(level) for i in range(len(P)))
+    return np.array([float(square.sqrt().upper()) for square in squares]) * (1 + 1e-6)
 
 
 def _is_negative(P: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:

@@ -16,17 +16,22 @@ from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.expressions.graph import Untraceable
 from nlctl.native.tubes.series import SeriesCode, series_code
-from nlctl.native.tubes.tube import LEAVES, MUST_LEAVE, REACHED, Tube, tube_from
+from nlctl.native.tubes.tube import LEAVES, MUST_LEAVE, REACHED, STUCK, Tube, tube_from
 from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
 from ...intervals.box import Box
+from ...recheck.digits import exact_text, text_below
 from .motion import motion_of
 
 _THREADS = 2
 _AT_ONCE = 16  # pieces that are begun before the clock is read
 _CELLS = 200  # parts of the time for which there are bounds
 _Status = Literal["proved", "refuted", "undecided"]
+_NOT_DIVIDED = {  # why a piece is not proved that is too small to be divided
+    LEAVES: "bounds of it leave at %s s, by less than they are wide: leave some room in within",
+    STUCK: "no step is found beyond %s s: perhaps a solution ends there, or a rate jumps",
+}
 
 
 @described_record(made_by="reachable_set")
@@ -76,9 +81,11 @@ class ReachableSet:
 
     def __str__(self) -> str:
         how = f"{counted(self.pieces, 'piece')}, {counted(self.steps, 'step')}"
-        claim = f"stays in {self.within}" if self.within is not None else "exists"
         if self.status == "proved":
-            return f"{claim} up to {self.times[-1]:.6g} s: proved with {how}"
+            sides = zip(self.within.names, self.within.cell, strict=True) if self.within else ()
+            limits = [f"{name} in [{exact_text(a)}, {exact_text(b)}]" for name, (a, b) in sides]
+            claim = f"stays in {', '.join(limits)}" if limits else "exists"
+            return f"{claim} up to {exact_text(self.times[-1])} s: proved with {how}"
         return f"{self.status}: {self.reason}"
 
 
@@ -216,6 +223,8 @@ class _Search:
                 self.pieces += len(now)
                 tubes = pool.map(self._tube, [piece for piece, _ in now])
                 for (piece, share), tube in zip(now, tubes, strict=True):
+                    if self.status == "refuted":
+                        break
                     self.steps += tube.steps
                     halves = self._halves(piece, tube)
                     self.proved += 0.0 if halves else share
@@ -242,20 +251,23 @@ class _Search:
         weight = weight if weight.any() else piece[:, 1] - piece[:, 0]
         side = int(np.argmax(np.where(piece[:, 0] < piece[:, 1], weight + 1e-300, -1.0)))
         if not piece[side, 0] < middle[side] < piece[side, 1]:
-            self._give_up([piece])
+            self._give_up([piece], _NOT_DIVIDED[tube.status] % f"{tube.time:.6g}")
             return []
         first, second = piece.copy(), piece.copy()
         first[side, 1] = second[side, 0] = middle[side]
         return [first, second]
 
-    def _give_up(self, left: list[np.ndarray]) -> None:
+    def _give_up(self, left: list[np.ndarray], why: str = "") -> None:
+        """Say what is not proved: what would be divided further, or cannot be."""
         around = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in left[0])
-        self.status, self.reason = (
-            "undecided",
-            f"not proved from {around} after {counted(self.pieces, 'piece')}; "
-            f"{100 * self.proved:.3g} % of the initial states are, the rest is divided further: "
-            "raise max_pieces or max_seconds, or start from less",
+        share = text_below(100 * self.proved)
+        further = (
+            f"{share} % of the initial states are, the rest is divided further: raise max_pieces "
+            "or max_seconds, or start from less"
         )
+        after = counted(self.pieces, "piece")
+        self.status = "undecided"
+        self.reason = f"not proved from {around} after {after}; {why or further}"
         self._know_nothing()
 
     def _know_nothing(self) -> None:

@@ -18,6 +18,8 @@ from nlctl.wording import counted
 
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import point_text
+from ...intervals.exact_matrices import exact_matrix, is_positive_definite
+from ...recheck.digits import text_above, text_below
 from ..convex import at_least, at_most, minimizer, symmetric_basis
 from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult
@@ -49,7 +51,7 @@ class AttractionRegion(ProofResult):
         """What is proved, in words."""
         if not self.holds:
             return "no region of attraction is proved"
-        return f"from V <= {self.level:.6g} everything goes to the equilibrium"
+        return f"from V <= {text_below(self.level)} everything goes to the equilibrium"
 
     def value(self, x: Sequence[float]) -> float:
         """Return V at a state.
@@ -68,12 +70,13 @@ class AttractionRegion(ProofResult):
         return float(z @ self.P @ z)
 
     def __str__(self) -> str:
+        if not self.holds:
+            return f"undecided: {self.reason}"
         where = f", {point_text(self.refuted)}" if self.refuted else ""
-        end = f"; {self.above:.6g} is not: {self.reason}{where}"
+        more = "more" if self.above == self.level else text_above(self.above)
         how = counted(self.boxes, "box", "boxes")
-        if self.holds:
-            return f"V <= {self.level:.6g} proved on {how}{end}"
-        return f"undecided: {self.reason}"
+        end = f"{more} is not: {self.reason}{where}"
+        return f"V <= {text_below(self.level)} proved on {how}; {end}"
 
 
 @as_annotated
@@ -214,7 +217,8 @@ def _positive_definite(P: object, n: int) -> np.ndarray:
     """Return a matrix that the user has given."""
     matrix = np.asarray(P, dtype=float)
     symmetric = matrix.shape == (n, n) and np.array_equal(matrix, matrix.T)
-    if not symmetric or not np.all(np.linalg.eigvalsh(matrix) > 0):
+    finite = symmetric and bool(np.all(np.isfinite(matrix)))
+    if not finite or not is_positive_definite(exact_matrix(matrix)):
         raise ParameterError(
             f"region_of_attraction needs P symmetric and positive definite, {n} x {n}, got "
             f"{str(P)[:60]}"

@@ -21,6 +21,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx
 from nlctl.expressions.graph import Expr, Untraceable, needed
 from nlctl.native.enclosures.scalars import scalar_expressions
 
+from ...intervals.exact_matrices import is_positive_definite
 from ..convex import ConeLimit, at_most, equal, minimizer, semidefinite
 
 __all__ = ["PositiveCondition", "Term", "monomial_terms", "polynomials_of", "positive_where"]
@@ -223,10 +224,9 @@ def _is_proved(
 
 
 def _is_definite(gram: _Gram, numbers: Sequence[Any]) -> bool:
-    """Whether all leading minors are positive."""
+    """Whether Q is, with these numbers."""
     size = len(gram.basis)
-    rows = [[fmpq(0)] * size for _ in range(size)]
+    Q = fmpq_mat(size, size)
     for (i, j), value in zip(gram.pairs, numbers, strict=True):
-        rows[i][j] = rows[j][i] = value
-    minors = (fmpq_mat([row[:m] for row in rows[:m]]).det() for m in range(1, size + 1))
-    return all(minor > 0 for minor in minors)
+        Q[i, j] = Q[j, i] = value
+    return is_positive_definite(Q)

@@ -17,6 +17,7 @@ from nlctl.names import find_name
 from nlctl.params import as_numbers
 
 from ...intervals.box import Box
+from ...recheck.digits import exact_text
 
 LEVEL = "V"
 _CORNERS = 12  # of sides that have a width: beyond, corners are drawn
@@ -121,7 +122,7 @@ class Starts:
         zeros = [name for name, _, low, high in self._groups() if low == high == 0]
         rest = ["all other states 0" if sides else "all states 0"] if zeros else []
         if self.level is not None:  # what V bounds is not named, and not 0
-            sides.insert(0, f"V(0) <= {self.level:.6g}")
+            sides.insert(0, f"V(0) <= {exact_text(self.level)}")
             rest = [f"{name}(0) = 0" for name in zeros]
         kept = [f"any consistent memory of {', '.join(self.kept)}"] if self.kept else []
         return ", ".join([*sides, *rest, *kept, "at t = 0"])
@@ -140,10 +141,12 @@ class Starts:
 def _side(name: str, count: int, low: float, high: float) -> str:
     """Say where a state starts; nothing for 0, and for what the level bounds."""
     if low == high:
-        return "" if low == 0 else f"{name}(0) = {low:.6g}"
+        return "" if low == 0 else f"{name}(0) = {exact_text(low)}"
     if not np.isfinite(high - low):
         return ""
-    return f"{name}(0) in [{low:.6g}, {high:.6g}]" + (f"^{count}" if count > 1 else "")
+    return f"{name}(0) in [{exact_text(low)}, {exact_text(high)}]" + (
+        f"^{count}" if count > 1 else ""
+    )
 
 
 def read_starts(

@@ -27,6 +27,7 @@ from nlctl.upstream.systems import System
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
+from ...recheck.digits import text_above
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..loop.checked import NOTHING_SUPPOSED, Supposed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
@@ -103,7 +104,7 @@ class KnownSignCertificate(filtered.FilteredCertificate):
         }
 
     def _bound(self) -> str:
-        return f"|r| <= {self.C_0:.6g} proved for all t"
+        return f"|r| <= {text_above(self.C_0)} proved for all t"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,6 +24,7 @@ from nlctl.controllers import FilteredError, SlidingModeLaw
 from nlctl.references import SumOfSines
 
 from ...intervals.branch_and_bound import upper
+from ...recheck.digits import text_above
 from ..bounds.error_bounds import error_bounds
 from ..loop.checked import read_checked
 from ..loop.roles import Pieces, has_law
@@ -88,7 +89,8 @@ class SlidingModeCertificate(filtered.FilteredCertificate):
         return {"K": law.K, "phi": law.phi}, {"plant": self.loop.states("plant")}
 
     def _bound(self) -> str:
-        return f"|r| <= {self.C_0:.6g} proved for all t, {self.ultimate:.6g} in the end,"
+        end = text_above(self.ultimate)
+        return f"|r| <= {text_above(self.C_0)} proved for all t, {end} in the end,"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,6 +17,7 @@ from nlctl.wording import counted
 
 from ...intervals.normal_form import exact
 from ...intervals.written import operations
+from ...recheck.digits import text_above
 from ..bounds.decomposition import Decomposition
 from ..loop.checked import ADDED
 from ..proofs.result import FROM_STARTS, Certificate, Row, per_second, rows_of_split
@@ -129,7 +130,8 @@ class ModelReferenceCertificate(Certificate):
             yield {"premises": premises, "proof": proof}
 
     def _bound(self) -> str:
-        return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end,"
+        end = text_above(self.ultimate)
+        return f"|e| <= {text_above(self.e)} proved for all t, {end} in the end,"
 
 
 _RAISED = (0.0, 0.01, 0.05, 0.2, 0.5)  # relative: how far C is above the one that closed

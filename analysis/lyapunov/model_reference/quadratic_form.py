@@ -19,6 +19,7 @@ from scipy.linalg import eigh
 
 from nlctl.errors import DiagramError
 
+from ...intervals.exact_matrices import exact_matrix, is_positive_definite, rational
 from ...intervals.normal_form import exact
 
 _SHRUNK = 1 - 1e-9  # of the least eigenvalue in floating point, to be proved a lower bound
@@ -27,14 +28,6 @@ _SHRUNK = 1 - 1e-9  # of the least eigenvalue in floating point, to be proved a 
 def ball(x: Any) -> arb:
     """Return a fraction or a float as a ball."""
     return arb(rational(x)) if isinstance(x, Fraction | fmpq) else arb(x)
-
-
-def rational(x: object) -> fmpq:
-    """Return a finite number as a rational one of flint."""
-    if isinstance(x, fmpq):
-        return x
-    fraction = exact(x)
-    return fmpq(fraction.numerator, fraction.denominator)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,22 +76,12 @@ def quadratic(M: fmpq_mat, x: Sequence[Any]) -> fmpq:
     return (column.transpose() * M * column)[0, 0]
 
 
-def is_positive_definite(M: fmpq_mat) -> bool:
-    """Whether a symmetric matrix is, by its leading minors."""
-    rows = M.tolist()
-    return all(
-        fmpq_mat(k, k, [v for row in rows[:k] for v in row[:k]]).det() > 0
-        for k in range(1, len(rows) + 1)
-    )
-
-
 def quadratic_form(path: str, K: Sequence[float], P: np.ndarray) -> QuadraticForm:
     """Prove that E^T P E is a Lyapunov function of E_n' = -K^T E; shapes: `P` (n, n)."""
     n = len(K)
-    lower = [[float(P[max(i, j), min(i, j)]) for j in range(n)] for i in range(n)]
-    for i in range(n):
-        lower[i][n - 1] = lower[n - 1][i] = float(P[i, n - 1])
-    exact_P = fmpq_mat(n, n, [rational(v) for row in lower for v in row])
+    lower = np.tril(P) + np.tril(P, -1).T
+    lower[n - 1] = lower[:, n - 1] = P[:, n - 1]
+    exact_P = exact_matrix(lower)
     A = [[int(j == i + 1) for j in range(n)] for i in range(n - 1)]
     companion = fmpq_mat(n, n, [rational(v) for row in A for v in row] + [-rational(k) for k in K])
     Q = -(companion.transpose() * exact_P + exact_P * companion)

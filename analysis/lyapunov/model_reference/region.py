@@ -15,7 +15,7 @@ from nlctl.plants import coordinate_names
 
 from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.box import Box
-from ...intervals.branch_and_bound import enclose, upper
+from ...intervals.branch_and_bound import enclose_relatively, upper
 from ...intervals.normal_form import exact
 from ..bounds.decomposition import Decomposition
 from .decrease import largest_weights
@@ -124,7 +124,5 @@ def _largest_rest(match: Matching, box: Box, tol: float) -> tuple[arb, int]:
     over = box.only(*names)
     if not all(np.isfinite(over[name][1]) for name in names if name != "t"):
         return arb("inf"), 0
-    rough = enclose(rest, over, max_boxes=1).magnitude
-    fineness = tol * rough if 0 < rough < np.inf else tol
-    bound = enclose(rest, over, tol=fineness, max_boxes=_BOXES)
+    bound = enclose_relatively(rest, over, tol, _BOXES)
     return arb(bound.magnitude), bound.boxes

@@ -17,7 +17,7 @@ from nlctl.wording import counted
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box
-from ...intervals.branch_and_bound import enclose, upper
+from ...intervals.branch_and_bound import enclose_relatively, upper
 from ...intervals.machine import Readable
 from ...intervals.normal_form import exact
 from ..bounds.decomposition import Decomposition, decompose
@@ -118,9 +118,7 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
         return whole
 
     matched, gain_of_v = _terms(loop.acceleration)
-    rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
-    fineness = tol * rough if 0 < rough < np.inf else tol
-    fine = enclose(matched, over_all("t"), tol=fineness, max_boxes=20_000)
+    fine = enclose_relatively(matched, over_all("t"), tol, 20_000)
     gain = range_of_quotient(gain_of_v, over_all("t", "v"), tol=tol, max_boxes=2_000)
     return Demand(
         C=C,

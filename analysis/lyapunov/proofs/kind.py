@@ -17,6 +17,7 @@ from flint import arb
 from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
+from ...recheck.digits import text_above, text_below
 from ..bounds.decomposition import Decomposition, only_declared
 from ..loop.checked import Supposed
 from .result import Certificate, ProofResult
@@ -130,11 +131,11 @@ def _closed(kind: Any, subject: Subject, max_iterations: int) -> Closed:
     else:
         steps = counted(max_iterations, "iteration")
         doubt = f"{kind.bounded} still grows after {steps}: {iterations[-1]:.6g}"
-    last, u = f"{kind.bounded} <= {iterations[-1]:.6g}", float("inf")
+    last, u = f"{kind.bounded} <= {text_above(iterations[-1])}", float("inf")
     if not doubt:
         u = kind.largest_input(subject, region, bound)
         doubt = _beyond_the_split(subject, u, last)
-    reason = doubt or f"the box closes: {kind.bounded} < {region.C:.6g} implies {last}"
+    reason = doubt or f"the box closes: {kind.bounded} < {text_below(region.C)} implies {last}"
     return Closed(
         region=region, bound=bound, iterations=tuple(iterations), u=u, reason=reason,
         holds=not doubt,

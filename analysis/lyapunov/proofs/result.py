@@ -14,6 +14,7 @@ from nlctl.errors import UsageError
 from nlctl.host.notebook import table_html
 
 from ...intervals.box import Box
+from ...recheck.digits import text_below
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Starts
 from .saved import Content, save_certificate
@@ -142,7 +143,7 @@ class Certificate(ProofResult):
     @property
     def assumptions(self) -> str:
         """From where, and with which external inputs, the bounds hold."""
-        added = f", whatever external inputs add up to {self.disturbance:.6g} to v"
+        added = f", whatever external inputs add up to {text_below(self.disturbance)} to v"
         return f"from {self.starts}{added if self.disturbance else ''}"
 
     @property

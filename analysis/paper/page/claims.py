@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...lyapunov.nussbaum.long_run import LongRun
+from ...recheck.digits import text_above
 from ...report.document import Claim
 from ...reproductions.cases import PaperRun
 from ...reproductions.paper import FoundNumber, PaperRuns
@@ -138,7 +139,7 @@ def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
             Claim(
                 text=f"Example {number}, with the sign of the gain known: |r| is bounded for all "
                 "time from the initial state",
-                measured=f"|r| ≤ {bound:.3f}; a run reaches {one.certified_max_r:.3f}",
+                measured=f"|r| ≤ {text_above(bound, 3)}; a run reaches {one.certified_max_r:.3f}",
                 limit="any bound, proved",
                 holds=bool(np.isfinite(bound)),
                 evidence=f"proof-{number}-bound",

@@ -91,8 +91,12 @@ def traced_numbers(
     return [numbers[i].only for i in range(numbers.size)]
 
 
-def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
+def enclosed(
+    results: Sequence[Expr], sides: int, fixed: int = 0, *, all_exist: bool = False
+) -> BoxCode:
     """Make the machine code that encloses functions of a box."""
+    # If all exist, nothing is bounded where one has no value: the least of numbers has none there.
+    # Of conditions that are not to hold at once it is enough that one surely does not.
     with np.errstate(all="ignore"):  # of constants
         graph, numbers = scalar_expressions(results)
         gradients = [_gradient(graph, expr, sides, fixed) for expr in numbers]
@@ -100,7 +104,7 @@ def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
         sides=sides,
         expressions=tuple(numbers),
         rows=judged_rows(sides, len(numbers)),
-        loaded=_loaded(enclosure_text(numbers, gradients, sides)),
+        loaded=_loaded(enclosure_text(numbers, gradients, sides, all_exist)),
         fixed=fixed,
     )
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .boxes import BoxCode
 from .search import ALL_PROVED, FULL, REFUTED, prove_below, supremum
@@ -43,15 +45,17 @@ class Supremum:
 
 def decide_claim(
     code: BoxCode,
-    low: np.ndarray,
-    high: np.ndarray,
+    low: ArrayLike,
+    high: ArrayLike,
     bound: float,
     *,
     max_boxes: int,
+    numbers: Sequence[float] | np.ndarray = (),
     threads: int = 1,
 ) -> BoxVerdict:
     """Prove or refute that the least of the functions is at most `bound` on a box."""
-    # Shapes: `low, high` (sides,).
+    # Shapes: `low, high` (sides,), without those whose `numbers` are given.
+    low, high = (np.append(side, numbers) for side in (low, high))
     _check_fixed(code, low, high)
     begun = _Search(code, np.stack([low, high], axis=1).reshape(1, -1), bound)
     begun.run(min(max_boxes, _ALONE))

@@ -28,8 +28,10 @@ class Monotone:
     """A function that rises or falls."""
 
     rises: bool = True
-    # where it is defined, and bounds of what it gives
+    # where it is defined, whether at the ends of that, too, and bounds of what it gives: a pole is
+    # no value, as 1/0 is none, and 0 log(0) is not a number
     domain: tuple[float, float] = (-_INF, _INF)
+    closed: bool = True
     values: tuple[float, float] = (-_INF, _INF)
     odd: bool = False  # whether its value has the sign of its argument
 
@@ -38,10 +40,10 @@ MONOTONE = {
     "exp": Monotone(values=(0.0, _INF)),
     "exp2": Monotone(values=(0.0, _INF)),
     "expm1": Monotone(values=(-1.0, _INF), odd=True),
-    "log": Monotone(domain=(0.0, _INF)),
-    "log2": Monotone(domain=(0.0, _INF)),
-    "log10": Monotone(domain=(0.0, _INF)),
-    "log1p": Monotone(domain=(-1.0, _INF), odd=True),
+    "log": Monotone(domain=(0.0, _INF), closed=False),
+    "log2": Monotone(domain=(0.0, _INF), closed=False),
+    "log10": Monotone(domain=(0.0, _INF), closed=False),
+    "log1p": Monotone(domain=(-1.0, _INF), closed=False, odd=True),
     "tanh": Monotone(values=(-1.0, 1.0), odd=True),
     "sinh": Monotone(odd=True),
     "arcsin": Monotone(domain=(-1.0, 1.0), odd=True),
@@ -49,7 +51,7 @@ MONOTONE = {
     "arctan": Monotone(odd=True),
     "arcsinh": Monotone(odd=True),
     "arccosh": Monotone(domain=(1.0, _INF), values=(0.0, _INF)),
-    "arctanh": Monotone(domain=(-1.0, 1.0), odd=True),
+    "arctanh": Monotone(domain=(-1.0, 1.0), closed=False, odd=True),
     "cbrt": Monotone(odd=True),
     "erf": Monotone(values=(-1.0, 1.0), odd=True),
     "erfc": Monotone(rises=False, values=(0.0, 2.0)),
@@ -87,10 +89,10 @@ def _by_ends(b: Body, x: Ends, name: str, known: Monotone) -> Ends:
     ends = Ends(low=low, high=high, not_negative=signed)
     if known.domain == (-_INF, _INF):
         return ends
-    inside = b.compare("oge", x.low, known.domain[0])
-    return arithmetic.defined(
-        b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), ends
-    )
+    first, last = known.domain
+    above = b.compare("oge" if known.closed else "ogt", x.low, first)
+    below = b.compare("ole" if known.closed or last == _INF else "olt", x.high, last)
+    return arithmetic.defined(b, b.logic("and", above, below), ends)
 
 
 def _steps(b: Body, x: Ends, name: str) -> _Result:

@@ -10,6 +10,7 @@ row k of `v` the same of result k.  What `judge` writes is in `JudgedRows`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -48,26 +49,31 @@ def judged_rows(sides: int, results: int) -> JudgedRows:
     return JudgedRows(*accumulate((_BEFORE, sides, sides, 2 * sides, 2 * results)))
 
 
-def enclosure_text(results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int) -> str:
-    """Return the IR of both functions."""
+def enclosure_text(
+    results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int, all_exist: bool
+) -> str:
+    """Return the IR of both functions; see `boxes.enclosed`."""
     all_of_it = needed([*results, *(g for gradient in gradients for g in gradient)])
     module = Module(inlined=len(all_of_it) <= INLINED)
-    texts = [_values(module, results), _judge(module, results, gradients, sides)]
+    texts = [_values(module, results), _judge(module, results, gradients, sides, all_exist)]
     return "\n".join([module.text(), *texts])
 
 
 def values_text(results: Sequence[Expr]) -> str:
-    """Return the IR of `values` alone."""
+    """Return the IR of `values` alone, in which what may jump has no value."""
     module = Module(inlined=len(needed(results)) <= INLINED)
-    text = _values(module, results)
+    text = _values(module, results, continuous=True)
     return f"{module.text()}\n{text}"
 
 
 class EnclosureWriter:
-    """Writes enclosures of expressions; `names` says what each is called so far."""
+    """Writes enclosures of expressions; `names` says what each is called so far.
 
-    def __init__(self, b: Body) -> None:
-        self.b = b
+    Where `continuous`, what may jump has no value.
+    """
+
+    def __init__(self, b: Body, continuous: bool = False) -> None:
+        self.b, self.continuous = b, continuous
         self.names: dict[Expr, Ends] = {}
         self.jumps: dict[Expr, Value] = {}  # where an expression may jump for a reason of its own
 
@@ -104,8 +110,13 @@ class EnclosureWriter:
         if node.op == "select":
             return self._choice(node, *args)
         result, jumps = interval_of(b, node.op, *args)
-        if jumps is not None:
-            self.jumps[node] = jumps
+        return result if jumps is None else self._with_jumps(node, result, jumps)
+
+    def _with_jumps(self, node: Expr, result: Ends, jumps: Value) -> Ends:
+        """Keep where an expression may jump."""
+        self.jumps[node] = jumps
+        if self.continuous:
+            return arithmetic.defined(self.b, arithmetic.negated(self.b, jumps), result)
         return result
 
     def _choice(self, node: Expr, condition: Ends, x: Ends, y: Ends) -> Ends:
@@ -115,8 +126,8 @@ class EnclosureWriter:
             question, first = node.args[0], node.args[1]
             smaller = (question.args[0] is first) == (question.op in ("lt", "le"))
             return (arithmetic.minimum if smaller else arithmetic.maximum)(self.b, x, y)
-        self.jumps[node] = arithmetic.left_open(self.b, condition)
-        return arithmetic.choice_of(self.b, condition, x, y)
+        either = arithmetic.choice_of(self.b, condition, x, y)
+        return self._with_jumps(node, either, arithmetic.left_open(self.b, condition))
 
     def ends(self, array: str, row: int) -> Ends:
         """Read an interval from two rows."""
@@ -139,9 +150,9 @@ class EnclosureWriter:
         return jump
 
 
-def _values(module: Module, results: Sequence[Expr]) -> str:
+def _values(module: Module, results: Sequence[Expr], continuous: bool = False) -> str:
     b = Body(module)
-    w = EnclosureWriter(b)
+    w = EnclosureWriter(b, continuous)
     w.write(results)
     for k, expr in enumerate(results):
         w.keep("v", 2 * k, *arithmetic.finite(w.names[expr]).values)
@@ -149,7 +160,11 @@ def _values(module: Module, results: Sequence[Expr]) -> str:
 
 
 def _judge(
-    module: Module, results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int
+    module: Module,
+    results: Sequence[Expr],
+    gradients: Sequence[Sequence[Expr]],
+    sides: int,
+    all_exist: bool,
 ) -> str:
     b, rows = Body(module), judged_rows(sides, len(results))
     w = EnclosureWriter(b)
@@ -164,7 +179,8 @@ def _judge(
         value = w.ends("o", rows.values + 2 * k)
         at_centre.append(value)
         bounds.append(_bound(w, expr, value, slopes[k], steps))
-    _kept(w, rows, bounds, at_centre, [_weights(b, box, slope) for slope in slopes])
+    exist = _all_are_numbers(w, results) if all_exist and len(results) > 1 else None
+    _kept(w, rows, bounds, at_centre, [_weights(b, box, slope) for slope in slopes], exist)
     return b.function("judge", pointers("xo"))
 
 
@@ -220,12 +236,18 @@ def _weights(b: Body, box: Sequence[Ends], slopes: Sequence[Ends]) -> list[Value
     return [b.add(v, known, exact=True) for v in weights]
 
 
+def _all_are_numbers(w: EnclosureWriter, results: Sequence[Expr]) -> Value:
+    exist = [w.b.compare("ord", *arithmetic.finite(w.names[expr]).values) for expr in results]
+    return reduce(lambda v, u: w.b.logic("and", v, u), exist)
+
+
 def _kept(
     w: EnclosureWriter,
     rows: JudgedRows,
     bounds: Sequence[Value],
     at_centre: Sequence[Ends],
     weights: Sequence[list[Value]],
+    exist: Value | None,
 ) -> None:
     """Write the least bound with the weights of its result, and the least value at the centre."""
     b, bound, weight = w.b, bounds[0], list(weights[0])
@@ -236,5 +258,8 @@ def _kept(
         weight = [b.select(smaller, v, u) for v, u in zip(weights[k], weight, strict=True)]
         value = arithmetic.minimum(b, Ends(low=met, high=above), at_centre[k])
         met, above = value.values
+    if exist is not None:
+        bound = b.select(exist, bound, _INF)
+        weight = [b.select(exist, v, arithmetic.NAN) for v in weight]
     w.keep("o", 0, bound, met, above)
     w.keep("o", rows.weight, *weight)

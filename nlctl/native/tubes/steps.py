@@ -136,11 +136,22 @@ def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, f
             coefficients(code, places, folds, lanes[g], order + 1, ky[g], read, first)
             is_held = _held(ky[g, order + 1], power, pad[g])
             if is_held:
+                is_held = _exist(ky[g, 0, rows : 2 * rows])
                 break
         if not is_held:
             return False
         write_into(rest[g], ky[g, order + 1, :rows])
     return True
+
+
+@kept(**AS_NUMPY)
+def _exist(rates):
+    """Whether the rates have values, and do not jump: higher coefficients may well have both."""
+    holds = True
+    for i in range(rates.shape[0]):
+        for lane in range(rates.shape[2]):
+            holds = holds and rates[i, 0, lane] <= rates[i, 1, lane]
+    return holds
 
 
 @kept(**AS_NUMPY)

@@ -144,6 +144,7 @@ WRONG = {  # all of them sealed anew, as one would who knows the format
         [["number", "-1"], ["*", len(made["premises"]["equation"]) - 1,
                             len(made["premises"]["equation"])]]),
     "another proof": put(("kind",), "known sign"),
+    "nothing": put(("claim",), {}),
     "an unknown proof": put(("kind",), "passivity"),
     "another version": put(("version",), 2),
 }  # fmt: skip
@@ -176,6 +177,19 @@ def test_another_true_claim_is_another_file(content, what):
         recheck(made)
     made["seal"] = seal_of(made)
     assert recheck(made)
+
+
+def test_the_answer_says_no_more_than_the_file(content):
+    """A bound is rounded up; two premises that are not equal are not printed alike."""
+    made = copy.deepcopy(content)
+    made["claim"] = {"|u|": "4124230001/10000000"}
+    made["premises"]["actuator"]["k_2"] = str(Fraction(made["premises"]["actuator"]["k_2"]) + 1)
+    scaled(("premises", "reference", "amplitudes"), 1 - Fraction(1, 10**9))(made)
+    made["seal"] = seal_of(made)
+    assert recheck(made).startswith("|u| <= 412.424; ")
+    plain, changed = (one.partition("yd = ")[2].partition(";")[0]
+                      for one in (recheck(content), recheck(made)))  # fmt: skip
+    assert plain != changed
 
 
 def test_nonsense_is_answered_with_no(content, tmp_path, capsys):

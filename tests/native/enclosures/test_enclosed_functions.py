@@ -100,7 +100,8 @@ def test_outside_of_a_domain_there_is_no_value():
     """No tight interval is made up where a function has none."""
     for name, low, high in [
         ("sqrt", -1e-300, 4.0), ("log", -1.0, 1.0), ("arcsin", 0.5, 1.5), ("tan", 1.5, 1.6),
-        ("arccosh", 0.5, 2.0), ("log1p", -2.0, 0.0),
+        ("arccosh", 0.5, 2.0), ("log1p", -2.0, 0.0), ("log", 0.0, 1.0), ("log2", 0.0, 0.0),
+        ("log10", 0.0, 4.0), ("log1p", -1.0, 1.0), ("arctanh", -1.0, 0.5), ("arctanh", 0.5, 1.0),
     ]:  # fmt: skip
         found = code_of(name).values(np.array([[low]]), np.array([[high]]))
         assert np.isnan(found[0][0, 0])
