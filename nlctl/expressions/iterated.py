@@ -60,8 +60,21 @@ class PassWriter(ast.NodeTransformer):
 
     def visit_For(self, node: ast.For) -> Any:
         self.generic_visit(node)
-        ends = _leaves(node, ast.Break) and not _leaves(node, ast.Return)
-        return (self._loop(node) if ends else None) or node
+        if _leaves(node, ast.Return):
+            return node
+        if _leaves(node, ast.Break):
+            return self._loop(node) or node
+        return self._counted(node)
+
+    def _counted(self, node: ast.For) -> Any:
+        """Note the passes of a loop that asks in each: there may be a search by halves in it."""
+        if not any(isinstance(part, ast.If | ast.IfExp | ast.Call) for part in ast.walk(node)):
+            return node
+        self.count += 1
+        name = f"passes@{self.count}"
+        begin = ast.Assign([ast.Name(name, ast.Store())], call_instead("passes"))
+        end = ast.Expr(_method(name, "end"))
+        return [_placed(ast.copy_location(s, node), node) for s in (begin, node, end)]
 
     def _loop(
         self, node: ast.For | ast.While, rest: Sequence[ast.stmt] | None = None

@@ -21,6 +21,7 @@ import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
+from .halving import Halving
 from .iterated import NOT_RETURNED, Loop, PassWriter
 from .library.ordered import sorted_list
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
@@ -264,6 +265,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("item"): functools.partial(_item, graph),
         INSTEAD_NAME.format("slice"): slice,
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
+        INSTEAD_NAME.format("passes"): lambda: Halving(graph),
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),

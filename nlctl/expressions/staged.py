@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .arrays import Special, Tracer, traced
+from .arrays import Special, Tracer, scalar, traced
 from .graph import Graph, MessageWritten, Untraceable
 from .library.rotations import enter_rotations
 from .library.rows import chosen_rows, is_table
@@ -305,6 +305,18 @@ class Ufunc:
         """Return all results of an element of one and of the other."""
         a, b = _base(self.graph, a), _base(self.graph, b)
         return self(a.reshape(a.shape + (1,) * b.ndim), b)
+
+    def at(self, array: Any, indices: Any, *others: Any) -> None:
+        """Change elements in place, one after the other: a place may come several times."""
+        known = settled(indices)
+        if not isinstance(array, Tracer) or holds_tracers(known):
+            raise Untraceable(f"{self.real.__name__}.at of places that depend on the state")
+        places = np.arange(array.size).reshape(array.shape)[known]
+        given = [np.broadcast_to(traced(self.graph, v).elements(), np.shape(places)).ravel()
+                 for v in others]  # fmt: skip
+        for k, place in enumerate(np.ravel(places)):
+            key = tuple(map(int, np.unravel_index(place, array.shape)))
+            array[key] = self(array[key], *(scalar(self.graph, v[k]) for v in given))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.real, name)

@@ -366,8 +366,9 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
-            if isinstance(value, BuiltinFunctionType) and isinstance(
-                thing, known_calls.WITH_METHODS
+            if isinstance(value, BuiltinFunctionType) and (
+                isinstance(thing, known_calls.WITH_METHODS)
+                or (isinstance(thing, type) and value.__self__ is thing)
             ):
                 return captured(value)  # a method, a new one each time it is read
             if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):

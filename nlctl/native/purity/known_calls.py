@@ -22,11 +22,11 @@ from ...expressions.library.table import WRITTEN
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
+from .handed_on import handed_on, rows
 from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
-    UNKNOWN_VALUE,
     Bound,
     Cached,
     Given,
@@ -373,7 +373,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if thing in MAKING:
         _call_functions(walk, given.places if by_key else given.every)
         inside = all(v.inside for v in places)
-        return KnownValue(True, inside, True, known=_rows(thing, places))
+        return KnownValue(True, inside, True, known=rows(thing, places))
     if name == "next":
         _written(places[0], "next()")
         return element(places[0])
@@ -416,28 +416,6 @@ def _check_parts(value: KnownValue, name: str, moves: bool) -> None:
                 check_object(captured(part), f"calls {name}() of a list that holds")
 
 
-def _functions_in(given: Sequence[KnownValue]) -> Any:
-    """Return the choice between the functions in what is gone through, for what calls one."""
-    parts = [element(v) for v in given]
-    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
-    functions = [v for v in parts if isinstance(v.known, kinds)]
-    functions = [
-        v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
-    ]
-    return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
-
-
-def _rows(thing: object, given: Sequence[KnownValue]) -> Any:
-    """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
-    kept = _functions_in(given)
-    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
-        return kept
-    parts = tuple(map(element, given))
-    parts = parts if thing is zip else (FRESH, parts[0])
-    every = all(v.own and v.inside for v in parts)
-    return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
-
-
 def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue:
     name = getattr(thing, "__name__", "")
     if name in _SEEDED and given.places and type(given.places[0].known) is int:
@@ -457,6 +435,9 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if name in named.WRITERS or (module.endswith("operator") and name in named.IN_PLACE):
         _written(given.places[0], f"{name}()")
         return element(given.places[0]) if "heap" in name else FRESH
+    parts = handed_on(module, name, given.places)
+    if parts is not None:
+        return parts
     if module in ("operator", "_operator") and isinstance(thing, type):
         return KnownValue(True, True, known=Pure(gives_parts=True))
     if _makes_objects(thing, module):

@@ -275,7 +275,9 @@ def library(thing: object) -> str | None:
         module = owner.__name__
     elif isinstance(thing, np.ufunc):
         module = "numpy"
-    elif owner is not None and not isinstance(owner, type):
+    elif isinstance(owner, type):
+        module = module or owner.__module__  # `chain.from_iterable`, `dict.fromkeys`
+    elif owner is not None:
         return None  # a method of some object
     return module if module.partition(".")[0] in _LIBRARIES else None
 

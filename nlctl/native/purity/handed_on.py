@@ -1,0 +1,65 @@
+"""What comes out of what goes through containers: `zip`, `enumerate`, all of itertools."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import FunctionType
+from typing import Any
+
+from .values import (
+    FRESH,
+    UNKNOWN_VALUE,
+    Bound,
+    Cached,
+    Instance,
+    KnownValue,
+    ListOf,
+    Local,
+    OneOf,
+    RowOf,
+    element,
+    holder,
+)
+
+# of itertools, what yields rows of what it is given; where it is of one thing in each place
+_OF_ROWS = ("product", "permutations", "combinations", "combinations_with_replacement",
+            "zip_longest", "pairwise", "batched", "tee", "groupby")  # fmt: skip
+_ZIPPED = ("product", "zip_longest")
+
+
+def _functions_in(given: Sequence[KnownValue]) -> Any:
+    """Return the choice between the functions in what is gone through, for what calls one."""
+    parts = [element(v) for v in given]
+    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
+    functions = [v for v in parts if isinstance(v.known, kinds)]
+    functions = [
+        v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
+    ]
+    return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
+
+
+def rows(thing: object, given: Sequence[KnownValue]) -> Any:
+    """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
+    kept = _functions_in(given)
+    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
+        return kept
+    parts = tuple(map(element, given))
+    parts = parts if thing is zip else (FRESH, parts[0])
+    every = all(v.own and v.inside for v in parts)
+    return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
+
+
+def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValue | None:
+    """Return what is known of what Python's functions hand on of what they are given."""
+    if (module, name) == ("copy", "copy") and places:
+        return KnownValue(True, places[0].inside, places[0].holds)
+    if (module, name) == ("builtins", "fromkeys"):
+        return holder(places[1:])
+    if module != "itertools" or name == "count":
+        return None
+    parts = list(places[:1]) if name == "repeat" else list(map(element, places))
+    if name == "from_iterable":
+        parts = list(map(element, parts))
+    held = holder([holder(parts)] if name in _OF_ROWS else parts)
+    return replace(held, known=rows(zip, places)) if name in _ZIPPED else held
