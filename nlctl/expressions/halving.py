@@ -15,6 +15,8 @@ _HALVINGS = 16  # comparisons, each of what the one before has chosen
 class Halving:
     """What the passes of a loop compute."""
 
+    __slots__ = ("computed", "graph", "place")  # one thing for loops inside, whatever it notes
+
     def __init__(self, graph: Graph) -> None:
         self.graph, self.place, self.computed = graph, len(graph.passing), set[Expr]()
         graph.passing.append(self.computed)

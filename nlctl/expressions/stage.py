@@ -258,7 +258,7 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
-        if (type(real).__name__, "pdf") in WRITTEN:  # a law of probability
+        if type(real).__module__.startswith("scipy.stats"):  # a family of laws
             return self._instead_of_object(real)
         if (getattr(real, "__module__", None) or "").startswith("scipy.optimize"):
             search = roots().get(real)

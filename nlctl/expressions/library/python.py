@@ -97,7 +97,10 @@ class Builtins:
     def _builtin(self, name: str, real: Any) -> Any:
         is_error = isinstance(real, type) and issubclass(real, BaseException)
         safe = name in _SAFE or is_error or not callable(real) or name == "__build_class__"
-        return real if safe else self.stage.for_numbers(real)
+        if safe:
+            return real
+        of_numbers = self.stage.for_numbers(real)
+        return NumberType(real, of_numbers) if isinstance(real, type) else of_numbers
 
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):

@@ -17,7 +17,7 @@ from .cells import by_numpy
 from .complex_numbers import ComplexPair
 from .creation import whole_numbers
 from .exponential import expm
-from .gamma import gamma, loggamma_of_size
+from .gamma import gamma, loggamma_of_size, lower_gamma, upper_gamma
 from .integral_functions import bessel, exponential_integral, macdonald, modified_bessel
 from .integrals import fixed_quad, quad
 from .linear_algebra import cholesky_factor, of_bands, of_cholesky, of_triangle, of_triangles
@@ -238,7 +238,14 @@ def _kept_logsumexp(np: Facade, x: object, axis: object) -> Any:
     return top + np.log(np.sum(np.exp(x - top), axis=axis, keepdims=True))
 
 
+def xlogy(np: Facade, x: Any, y: Any) -> Any:
+    """x ln y, 0 where x is."""
+    return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y))
+
+
 _FORMULAS = {
+    "gammainc": lower_gamma,
+    "gammaincc": upper_gamma,
     "exp10": lambda np, x: np.power(10.0, x),
     "ndtr": lambda np, x: 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x),
     "huber": huber,
@@ -246,7 +253,7 @@ _FORMULAS = {
     "expit": lambda np, x: 1.0 / (1.0 + np.exp(-1.0 * x)),
     "logit": lambda np, x: np.log(x / (1.0 - x)),
     "log_expit": lambda np, x: -1.0 * np.logaddexp(0.0, -1.0 * x),
-    "xlogy": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y)),
+    "xlogy": xlogy,
     "xlog1py": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y)),
     "softmax": softmax,
     "logsumexp": logsumexp,

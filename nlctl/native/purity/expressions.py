@@ -234,7 +234,7 @@ class Expressions(ast.NodeVisitor):
             self.operated(type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
-            is_one = is_constant or isinstance(value.known, enum.Enum)
+            is_one = is_constant or isinstance(value.known, enum.Enum | type)
             if is_one and isinstance(part, ast.Constant) and part.value is not None:
                 self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
             if isinstance(test, ast.Is | ast.IsNot) and not is_one:

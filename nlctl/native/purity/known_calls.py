@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.library.table import WRITTEN
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
@@ -163,10 +162,10 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     """Return what is known of the result of a function or method of Python code."""
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
-        if (type(owner).__name__, thing.__name__) in WRITTEN:
-            return FRESH
         if thing.__name__ in named.OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
-            raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
+            for name in ("args", "kwds") if hasattr(owner, "dist") else ():  # the law's numbers
+                walk.captured(owner, name, getattr(owner, name))
+            return FRESH
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
     if isinstance(owner, re.Pattern | re.Match):
         return KnownValue(True, True, known=Pure())

@@ -36,7 +36,8 @@ CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "rev
             "rotate"}  # fmt: skip
 # of sparse matrices, what changes them; of laws of probability; of tables of pandas
 OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_zeros", "prune")
-OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
+OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "logsf", "ppf", "pmf", "logpmf", "isf", "mean",
+           "std", "var", "median", "moment", "entropy", "interval", "support")  # fmt: skip
 OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
               "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 # of builtins that return numbers and texts
