@@ -1,4 +1,4 @@
-"""What nlctl relies on of SciPy that nobody documents: what laws of probability are written with."""
+"""What nlctl relies on of SciPy and nobody documents: what its laws are written with."""
 
 import math
 
