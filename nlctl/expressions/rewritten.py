@@ -27,7 +27,8 @@ from .iterated import NOT_RETURNED, Loop, PassWriter
 from .library.ordered import sorted_list
 from .library.table import unwrapped
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
-from .operators import elementwise, is_numpys
+from .operators import elementwise
+from .promoted import is_numpys
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}

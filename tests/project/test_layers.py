@@ -82,7 +82,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["integers", "halving"],
-        ["arrays", "operators", "masked", "indexing", "edges"],
+        ["arrays", "promoted", "operators", "masked", "indexing", "edges"],
         ["sharp", "without_poles", "decimals"],
         ["levels"],
         [

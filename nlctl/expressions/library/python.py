@@ -18,7 +18,8 @@ from ..arrays import Tracer, python_number, scalar, traced
 from ..decimals import to_decimals
 from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
-from ..operators import elementwise, is_numpys
+from ..operators import elementwise
+from ..promoted import is_numpys
 from .ordered import extreme, first_ones, sorted_things
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 

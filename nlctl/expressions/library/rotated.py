@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from .table import Facade
