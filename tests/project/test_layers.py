@@ -81,7 +81,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["signs"],
         ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
-        ["integers", "halving"],
+        ["integers", "gains", "halving"],
         ["arrays", "promoted", "operators", "masked", "indexing", "edges"],
         ["sharp", "without_poles", "decimals"],
         ["levels"],

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
@@ -189,6 +190,8 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
         module = getattr(thing, "__module__", None) or getattr(owner, "__name__", "")
         text = f"{module}.{name}" if module else name
         raise Impure(f"calls {text}, whose code cannot be read", "write the formula out")
+    if computes_gains(thing):
+        return FRESH
     if isinstance(thing, FunctionType) or thing.__class__.__name__ == "CPUDispatcher":
         return walk.function(function, given)
     if not isinstance(thing, MethodType):
