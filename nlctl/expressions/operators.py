@@ -336,11 +336,23 @@ def _power(base: Any, exponent: Any) -> Any:
         return elementwise(exponent.graph, "power", base, exponent)
     if not isinstance(base, Tracer):
         return base**exponent
+    whole = isinstance(exponent, int | np.integer) and abs(exponent) <= 64
     if base.graph.attempts and not is_numpys(base.graph, base):
-        raise Untraceable("try around a power of what may be Python's own numbers")
-    if isinstance(exponent, int | np.integer) and abs(exponent) <= 64:
-        return mapped_cells(base, lambda e: base.graph.power(e, int(exponent)))
+        if not (whole and exponent > 0 and base.is_pythons and base.only.kind == "f"):
+            raise Untraceable("try around a power of what may be Python's own numbers")
+        _ask_size(base, int(exponent))
+    if whole:
+        powers = mapped_cells(base, lambda e: base.graph.power(e, int(exponent)))
+        return _as_their_result(powers, [base])
     return elementwise(base.graph, "power", base, exponent)
+
+
+def _ask_size(base: Tracer, exponent: int) -> None:
+    """Raise an error where the power of a float of Python's own is too large."""
+    graph, infinity = base.graph, base.graph.const(math.inf)
+    power, size = (graph.op("absolute", graph.power(base.only, n)) for n in (exponent, 1))
+    too_large = graph.op("and", graph.op("eq", power, infinity), graph.op("lt", size, infinity))
+    graph.guard(graph.op("not", too_large), OverflowError)
 
 
 _OF_BITS: dict[str, Callable[..., Any]] = dict.fromkeys(("and", "or", "xor"), bits)

@@ -10,7 +10,7 @@ import inspect
 import logging
 import re
 import warnings
-from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
+from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
@@ -65,7 +65,7 @@ _SEEDED = ("default_rng", "RandomState")
 CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | frozenset | str
               | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
-HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
+HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 
 
@@ -155,7 +155,8 @@ def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
         made.walk_tuple(walk, cls)
         holds = True
     if holds:
-        return KnownValue(True, all(v.own and v.inside for v in parts), True)
+        own = cls is not ChainMap or all(v.own for v in parts[:1])  # which it writes into
+        return KnownValue(own, all(v.own and v.inside for v in parts), True)
     return made.instance(walk, cls, given)
 
 
@@ -191,7 +192,7 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
         text = f"{module}.{name}" if module else name
         raise Impure(f"calls {text}, whose code cannot be read", "write the formula out")
     if computes_gains(thing):
-        return FRESH
+        return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
     if isinstance(thing, FunctionType) or thing.__class__.__name__ == "CPUDispatcher":
         return walk.function(function, given)
     if not isinstance(thing, MethodType):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import ast
 import contextlib
+import enum
 import importlib
 import sys
 import warnings
@@ -27,6 +28,7 @@ from .values import (
     Instance,
     KnownValue,
     Local,
+    OneOf,
     captured,
     element,
     forgotten,
@@ -104,7 +106,9 @@ class CallWalker(Expressions):
             if isinstance(value.known, Instance):
                 self.assign(node.target.id, self.changed_object(node, value, added))
                 return
-            if not value.own:
+            choices = value.known.choices if isinstance(value.known, OneOf) else (value,)
+            fixed = all(isinstance(choice.known, enum.Enum) for choice in choices)
+            if not value.own and not fixed:  # a combination of members is another one
                 name, mark = node.target.id, _SIGNS.get(type(node.op), "+")
                 raise Impure(
                     f"changes '{name}' in place with {mark}=, which it did not make",
