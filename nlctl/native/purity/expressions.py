@@ -146,7 +146,7 @@ class Expressions(ast.NodeVisitor):
             self.visit(target.slice)
         if isinstance(base.known, Instance):
             return self.write_object(target, base, value)
-        if isinstance(base.known, ListOf | OneOf):
+        if isinstance(base.known, ListOf | OneOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
         if not base.own:
             text = ast.unparse(target.value)

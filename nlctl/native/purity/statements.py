@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 import ast
 import contextlib
-import enum
 import importlib
 import sys
 import warnings
@@ -28,7 +27,6 @@ from .values import (
     Instance,
     KnownValue,
     Local,
-    OneOf,
     captured,
     element,
     forgotten,
@@ -106,9 +104,7 @@ class CallWalker(Expressions):
             if isinstance(value.known, Instance):
                 self.assign(node.target.id, self.changed_object(node, value, added))
                 return
-            choices = value.known.choices if isinstance(value.known, OneOf) else (value,)
-            fixed = all(isinstance(choice.known, enum.Enum) for choice in choices)
-            if not value.own and not fixed:  # a combination of members is another one
+            if not value.own:
                 name, mark = node.target.id, _SIGNS.get(type(node.op), "+")
                 raise Impure(
                     f"changes '{name}' in place with {mark}=, which it did not make",

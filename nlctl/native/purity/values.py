@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from enum import EnumType
+from enum import EnumType, Flag
 from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -175,7 +175,7 @@ SLICE = KnownValue(True, True, known=slice(None))
 
 def captured(thing: object) -> KnownValue:
     """Return what is known of an object that was there before the call."""
-    if isinstance(thing, PLAIN):
+    if isinstance(thing, (*PLAIN, Flag)):
         return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
         return KnownValue(False, thing.ndim <= 1, known=thing)
