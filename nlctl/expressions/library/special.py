@@ -243,7 +243,22 @@ def xlogy(np: Facade, x: Any, y: Any) -> Any:
     return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y))
 
 
+def log_ndtr(np: Facade, x: Any) -> Any:
+    """ln of the normal distribution function; far to the left by its series (DLMF 7.12.1)."""
+    root = math.sqrt(0.5)
+    right = np.log1p(-0.5 * _elementwise("erfc", np.graph, root * x))
+    left = np.log(0.5 * _elementwise("erfc", np.graph, -root * np.maximum(x, -30.0)))
+    far = np.minimum(x, -20.0)
+    square = 1.0 / (far * far)
+    series = functools.reduce(lambda total, k: 1.0 - k * square * total, (11, 9, 7, 5, 3, 1), 1.0)
+    tail = -0.5 * far * far - np.log(-far) - 0.5 * math.log(2.0 * math.pi) + np.log(series)
+    return np.where(x > -1.0, right, np.where(x > -20.0, left, np.where(x == x, tail, x)))
+
+
 _FORMULAS = {
+    "log_ndtr": log_ndtr,
+    "chdtr": lambda np, v, x: lower_gamma(np, 0.5 * v, 0.5 * x),
+    "chdtrc": lambda np, v, x: upper_gamma(np, 0.5 * v, 0.5 * x),
     "gammainc": lower_gamma,
     "gammaincc": upper_gamma,
     "exp10": lambda np, x: np.power(10.0, x),
