@@ -388,6 +388,7 @@ class Expressions(ast.NodeVisitor):
                 self.kept(base, given.every)
                 return bound
         function = self.visit(node.func)
+        given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
         if function.known is getattr and isinstance(places[1].known, str):

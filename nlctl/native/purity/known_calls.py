@@ -14,7 +14,7 @@ from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, name
 from collections.abc import Sequence
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -123,7 +123,7 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
     if isinstance(thing, np.vectorize):
         _call_functions(walk, [walk.captured(thing, "pyfunc", thing.pyfunc)])
         return FRESH
-    if thing is namedtuple:
+    if thing is namedtuple or thing is NamedTuple:
         return made.named_tuple(given)
     if thing is dataclasses.replace and places:
         return made.replaced_fields(walk, places[0], given.names)
