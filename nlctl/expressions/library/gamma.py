@@ -63,7 +63,7 @@ def _exponent(a: Any) -> float:
     """Return the exponent of an incomplete gamma function, an integer or a half one."""
     number = known_numbers(a, "exponents of the incomplete gamma function")
     if number.size != 1 or not 0.0 < number.item() <= _MOST or number.item() % 0.5:
-        raise Untraceable("the incomplete gamma function of an exponent that is no half integer")
+        raise Untraceable("the incomplete gamma function of an exponent that is not a half integer")
     return float(number.item())
 
 

@@ -1,6 +1,6 @@
 """Eigenvalues of symmetric matrices and singular values, by Jacobi's rotations.
 
-After a sweep through all pairs of rows what is left beside the diagonal is about the square of what
+After a sweep through all pairs of rows what is left off the diagonal is about the square of what
 there was before, so that a few sweeps are enough for every matrix of so few rows.
 
 Source: G. H. Golub and C. F. Van Loan, Matrix Computations (4th ed., 2013), 8.5.2 and 8.6.3.

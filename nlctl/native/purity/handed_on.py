@@ -39,7 +39,7 @@ def _functions_in(given: Sequence[KnownValue]) -> Any:
     return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
 
 
-def rows(thing: object, given: Sequence[KnownValue]) -> Any:
+def rows_of_functions(thing: object, given: Sequence[KnownValue]) -> Any:
     """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
     kept = _functions_in(given)
     if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
@@ -62,4 +62,4 @@ def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValu
     if name == "from_iterable":
         parts = list(map(element, parts))
     held = holder([holder(parts)] if name in _OF_ROWS else parts)
-    return replace(held, known=rows(zip, places)) if name in _ZIPPED else held
+    return replace(held, known=rows_of_functions(zip, places)) if name in _ZIPPED else held

@@ -22,7 +22,7 @@ from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
-from .handed_on import handed_on, rows
+from .handed_on import handed_on, rows_of_functions
 from .values import (
     FRESH,
     OUTSIDE,
@@ -155,8 +155,8 @@ def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
         made.walk_tuple(walk, cls)
         holds = True
     if holds:
-        own = cls is not ChainMap or all(v.own for v in parts[:1])  # which it writes into
-        return KnownValue(own, all(v.own and v.inside for v in parts), True)
+        is_new = cls is not ChainMap or all(v.own for v in parts[:1])  # it writes into that
+        return KnownValue(is_new, all(v.own and v.inside for v in parts), True)
     return made.instance(walk, cls, given)
 
 
@@ -376,7 +376,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if thing in MAKING:
         _call_functions(walk, given.places if by_key else given.every)
         inside = all(v.inside for v in places)
-        return KnownValue(True, inside, True, known=rows(thing, places))
+        return KnownValue(True, inside, True, known=rows_of_functions(thing, places))
     if name == "next":
         _written(places[0], "next()")
         return element(places[0])
