@@ -210,16 +210,24 @@ HEIR = Heir()
 
 @pytest.mark.parametrize("above", [0.0, 3.0])
 def test_what_cannot_be_asked_on_expressions_is_called(above):
-    """Words that stay as they are: of a lambda, of a method that calls super(), of a class."""
+    """Words that stay as they are: of a lambda, of a method that calls super()."""
     for source in (
         lambda t, x, u, params: [1.0 if (float(x[0]) > 1.0) is True else 2.0],
         lambda t, x, u, params: [HEIR.value(x[0], float(x[0]) > 1.0)],
-        _by_class,
+        lambda t, x, u, params: [1.0 if type(HEIR) is Heir else x[0]],
     ):
         system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
         compiled = nlctl.compile(system)
         assert compiled.equations.calls
         assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_an_object_from_outside_is_of_its_class_in_a_pattern(above):
+    system = ct.nlsys(_by_class, None, states=1, inputs=1, outputs=1)
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
 
 
 def _by_class(t, x, u, params):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...expressions.source import cells_of, source_file
-from . import known_calls, made
+from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
 from .values import (
@@ -217,8 +217,7 @@ class Expressions(ast.NodeVisitor):
         if results:
             return least_upper_bound(results)
         self.operands(plain)
-        of_library = any(isinstance(v.known, Pure) for v in plain)
-        return KnownValue(True, True, known=Pure()) if of_library else FRESH
+        return handed_on.operated(kind, plain)
 
     def operands(self, values: Sequence[KnownValue]) -> None:
         """Check that operators are those of numbers, arrays and containers."""
@@ -379,7 +378,8 @@ class Expressions(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> KnownValue:
         places = tuple(self.visit(part) for part in node.args)
         given = Given(places, {k.arg or "**": self.visit(k.value) for k in node.keywords})
-        if "out" in given.names and not given.names["out"].own:
+        out = given.names.get("out", FRESH)
+        if not out.own or handed_on.holds_others(out):
             raise Impure("writes into an array with out=, which it did not make", CHANGES)
         if isinstance(node.func, ast.Attribute):
             base = self.visit(node.func.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Sequence
 from dataclasses import replace
 from types import FunctionType
@@ -10,6 +11,7 @@ from typing import Any
 from .values import (
     FRESH,
     UNKNOWN_VALUE,
+    VECTOR,
     Bound,
     Cached,
     Instance,
@@ -17,8 +19,10 @@ from .values import (
     ListOf,
     Local,
     OneOf,
+    Pure,
     RowOf,
     element,
+    forgotten,
     holder,
 )
 
@@ -56,6 +60,12 @@ def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValu
         return KnownValue(True, places[0].inside, places[0].holds)
     if (module, name) == ("builtins", "fromkeys"):
         return holder(places[1:])
+    if (module, name) == ("builtins", "mappingproxy") and places:
+        return replace(forgotten(places[0]), holds=True)
+    if name == "getitem" and module in ("operator", "_operator"):
+        return element(places[0])
+    if name in ("nlargest", "nsmallest", "merge") and module in ("heapq", "_heapq"):
+        return holder(map(element, places))
     if module != "itertools" or name == "count":
         return None
     parts = list(places[:1]) if name == "repeat" else list(map(element, places))
@@ -63,3 +73,26 @@ def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValu
         parts = list(map(element, parts))
     held = holder([holder(parts)] if name in _OF_ROWS else parts)
     return replace(held, known=rows_of_functions(zip, places)) if name in _ZIPPED else held
+
+
+def views_of(values: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of a list of views of arrays, each of which is whose the array is."""
+    if all(v.own for v in values):
+        return KnownValue(True, all(v.inside for v in values), True)
+    if all(v.inside for v in values):
+        return KnownValue(True, False, True, known=ListOf((VECTOR,)))
+    return KnownValue(True, False, True)
+
+
+def holds_others(value: KnownValue) -> bool:
+    """Whether a value is a list or dict that holds what the call has not made."""
+    is_container = isinstance(value.known, list | tuple | dict) or (value.own and value.holds)
+    return is_container and not value.inside
+
+
+def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of the result of an operator of numbers, arrays and containers."""
+    if kind in (ast.Add, ast.Mult, ast.BitOr) and any(map(holds_others, values)):
+        return KnownValue(True, False, True)  # a list or dict of what is in both
+    of_library = any(isinstance(v.known, Pure) for v in values)
+    return KnownValue(True, True, known=Pure()) if of_library else FRESH

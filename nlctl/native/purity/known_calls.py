@@ -9,6 +9,7 @@ import functools
 import inspect
 import logging
 import re
+import sys
 import warnings
 from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
-from .handed_on import handed_on, rows_of_functions
+from .handed_on import handed_on, rows_of_functions, views_of
 from .values import (
     FRESH,
     OUTSIDE,
@@ -151,6 +152,9 @@ def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
     if holds:
         _call_functions(walk, parts)
         parts = tuple(v for v in parts if not isinstance(v.known, type))
+        if cls is defaultdict and parts and parts[:1] == given.places[:1]:
+            made_anew = isinstance(parts[0].known, Unknown | None)
+            parts = parts[1:] if made_anew else (walk.call(parts[0], Given()), *parts[1:])
     if issubclass(cls, tuple) and hasattr(cls, "_fields"):
         made.walk_tuple(walk, cls)
         holds = True
@@ -257,6 +261,8 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if name in named.READING:
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
+        if name == "astype" and given.names.get("copy", captured(True)).known is not True:
+            return forgotten(base)
         return _read(base, name, given.places)
     if name in named.VIEWS or name in ("T", "flat"):
         return forgotten(base)
@@ -446,9 +452,26 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if _makes_objects(thing, module):
         # it may hold what it is given, instead of copies
         return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
-    if name in named.VIEWS or given.names.get("copy", captured(True)).known is not True:
+    for value in given.places[_place_of_out(thing, name) :]:
+        _written(value, f"{name}(..., out)")
+    may_be_it = given.names.get("copy", captured(True)).known is not True
+    if name == "nan_to_num" and may_be_it:
+        _written(given.places[0], f"{name}()")
+    if name in named.LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):
+        several = name in ("broadcast_arrays", "meshgrid")
+        return views_of(given.places if several else given.places[:1])
+    if name == "einsum" and len(given.places) == 2:
+        return forgotten(given.places[1])
+    if name in named.VIEWS or may_be_it or module.startswith("numpy.ma"):
         return forgotten(given.places[0]) if given.places else FRESH
     return FRESH
+
+
+def _place_of_out(thing: object, name: str) -> int:
+    """Return the place from which arguments are arrays that are written into."""
+    if isinstance(thing, np.ufunc):
+        return thing.nin
+    return {"clip": 3, "dot": 2}.get(name, sys.maxsize)
 
 
 def _makes_objects(thing: object, module: str) -> bool:
@@ -468,4 +491,5 @@ def _call_functions(walk: Walk, values: Any) -> None:
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices)
         elif isinstance(thing, Local | Bound | Cached | Instance) or callable(thing):
-            walk.call(value, Given((OUTSIDE,) * 8))
+            count = getattr(thing, "nin", 2 if library(thing) else 8)
+            walk.call(value, Given((OUTSIDE,) * count))
