@@ -252,3 +252,29 @@ def test_where_nan_is_sorted_the_function_is_called():
     np.testing.assert_allclose(response.outputs[:, -1], np.exp(-1), rtol=1e-6)
     called = nlctl.input_output_response(compiled, [0.0, 1.0], -1.0, np.ones(6))
     np.testing.assert_allclose(called.outputs[:, -1], np.exp(-1), rtol=1e-6)
+
+
+KEYS = {1: 2.0, 2: 3.0}
+
+
+def _types(t, x, u, params):
+    numbers, text = {1: x[0], 2: 1.0}, f"{x[0]}"
+    kinds = (type(numbers) is dict, type(KEYS) == dict, type(text) is str)  # noqa: E721
+    return [numbers[1] if all(kinds) and isinstance(np.tanh, object) else 5.0]
+
+
+@pytest.mark.parametrize("source", [
+    lambda t, x, u, params: [1.0 if isinstance(np.tanh, np.ufunc) else x[0]],
+    lambda t, x, u, params: [1.0 if type(np.tanh) == type(np.sin) else x[0]],  # noqa: E721
+])  # fmt: skip
+def test_the_type_of_a_function_is_asked_where_it_stands(source):
+    """In a trace something else stands for it."""
+    compiled = nlctl.compile(ct.nlsys(source, None, states=1, inputs=1, outputs=1))
+    assert compiled.equations.calls
+    assert compiled.dynamics(0.0, [0.5], [0.0]) == [1.0]
+
+
+def test_types_of_what_stands_for_others_are_theirs():
+    compiled = nlctl.compile(ct.nlsys(_types, None, states=1, inputs=1, outputs=1))
+    assert not compiled.equations.calls
+    assert compiled.dynamics(0.0, [0.5], [0.0]) == [0.5]

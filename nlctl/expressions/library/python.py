@@ -9,7 +9,7 @@ import heapq
 import math
 import sys
 from collections.abc import Callable
-from types import FunctionType, NoneType
+from types import BuiltinFunctionType, FunctionType, MethodType, NoneType
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
+_FUNCTIONS = (FunctionType, MethodType, BuiltinFunctionType, functools.partial)
 _EXACT = 22  # the largest power of ten that is a float
 # of a kind of numbers: those of Python and of NumPy
 NUMBER_SAMPLES = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
@@ -162,6 +163,8 @@ class Builtins:
         both = (*kinds, *(originals[k] for k in kinds if k in originals))
         if isinstance(thing, Tracer):
             return self._is_number(thing, both)
+        if callable(thing) and any(k in both for k in (*_FUNCTIONS, np.ufunc)):
+            raise Untraceable("the type of a function")
         real = thing.__dict__["_real"] if hasattr(type(thing), "_forwards") else thing
         return isinstance(real, both)
 
@@ -198,7 +201,14 @@ class Builtins:
             raise Untraceable("the type of what is only known when it runs")
         if hasattr(type(thing), "_forwards"):
             return self.stage.instead(type(thing.__dict__["_real"]))
-        return type(thing, *rest)
+        if rest:
+            return type(thing, *rest)
+        kind = thing.__class__
+        stands_for_another = kind.__module__.startswith("nlctl.expressions.")
+        if callable(thing) and (stands_for_another or isinstance(thing, _FUNCTIONS)):
+            raise Untraceable("the type of a function")
+        known = (cls for cls in kind.__mro__ if cls.__module__ == "builtins")
+        return next(known) if stands_for_another else kind
 
     def _super(self, *given: Any) -> Any:
         frame = sys._getframe(1)
