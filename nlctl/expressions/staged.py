@@ -328,8 +328,10 @@ class Ufunc:
         if not isinstance(array, Tracer) or holds_tracers(known):
             raise Untraceable(f"{self.real.__name__}.at of places that depend on the state")
         places = np.arange(array.size).reshape(array.shape)[known]
-        given = [np.broadcast_to(traced(self.graph, v).elements(), np.shape(places)).ravel()
-                 for v in others]  # fmt: skip
+        values = [traced(self.graph, v).elements() for v in others]
+        if any(v.shape not in ((), np.shape(places)) for v in values):  # NumPy 2.4 reads beyond
+            raise Untraceable(f"{self.real.__name__}.at of values that are repeated")
+        given = [np.broadcast_to(v, np.shape(places)).ravel() for v in values]
         for k, place in enumerate(np.ravel(places)):
             key = tuple(map(int, np.unravel_index(place, array.shape)))
             array[key] = self(array[key], *(scalar(self.graph, v[k]) for v in given))

@@ -278,3 +278,16 @@ def test_types_of_what_stands_for_others_are_theirs():
     compiled = nlctl.compile(ct.nlsys(_types, None, states=1, inputs=1, outputs=1))
     assert not compiled.equations.calls
     assert compiled.dynamics(0.0, [0.5], [0.0]) == [0.5]
+
+
+def test_values_that_are_repeated_over_places_are_left_to_numpy():
+    """NumPy 2.4 reads beyond the end of the two of them."""
+
+    def update(t, x, u, params):
+        sums = np.zeros(3)
+        np.add.at(sums, np.array([[0, 1], [1, 2]]), x[:2])
+        return sums
+
+    compiled = nlctl.compile(ct.nlsys(update, None, states=3, inputs=1, outputs=3))
+    (call,) = compiled.equations.calls.values()
+    assert "repeated" in call.reason

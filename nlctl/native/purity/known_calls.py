@@ -114,10 +114,11 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return KnownValue(True, True, known=known)
     if thing is functools.reduce and not isinstance(places[0].known, Unknown):
         return _reduced(walk, places)
-    if isinstance(thing, enum.EnumType) and len(places) == 1 and not issubclass(thing, enum.Flag):
-        if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
+    if isinstance(thing, enum.EnumType) and len(places) == 1:
+        missing = inspect.getattr_static(thing, "_missing_")
+        if missing not in [vars(cls)["_missing_"] for cls in (enum.Enum, enum.Flag)]:
             raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
-        return element(captured(thing))
+        return FRESH if issubclass(thing, enum.Flag) else element(captured(thing))
     if thing is np.frompyfunc:
         _call_functions(walk, places[:1])
         return KnownValue(True, True, known=Pure())

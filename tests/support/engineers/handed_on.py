@@ -105,7 +105,7 @@ class Fault(Flag):
 
 @engineered(2)
 def combined_flags(t, x, u, params):
-    fault = Fault.NONE
+    fault = Fault(0)
     if x[0] > 1:
         fault |= Fault.OVER
     if x[1] < -1:
@@ -188,7 +188,8 @@ OFFSETS = np.array([3, -1], dtype=np.int8)
 
 @engineered(2)
 def weights_of_single_precision(t, x, u, params):
-    return np.tanh(W @ x + OFFSETS) - np.float32(0.1) * x + W[0] / (1 + x**2)
+    shifted = np.tanh(W @ x + OFFSETS) + OFFSETS.astype(float)
+    return shifted - np.float32(0.1) * x + W[0] / (1 + x**2)
 
 
 # -- loops and errors ------------------------------------------------------------------------------
