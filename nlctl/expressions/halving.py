@@ -2,14 +2,18 @@
 
 ``for _ in range(40): mid = (lo + hi) / 2; if f(mid) > 0: hi = mid`` asks in each pass for what
 those before have chosen.  Where one answer changes, the later ones change with it, and what comes
-out hardly does: a staircase of 2^40 steps, none of which is a jump.
+out hardly does: a staircase of 2^40 steps, none of which is a jump.  Its derivative would be 0.
 """
 
 from __future__ import annotations
 
-from .graph import ORDERS, Expr, Graph, needed
+from .graph import ORDERS, Expr, Graph, Untraceable, needed
 
 _HALVINGS = 16  # comparisons, each of what the one before has chosen
+
+
+class Staircase(Untraceable):
+    """What a function computes has steps smaller than rounding: no expression has its slope."""
 
 
 class Halving:
@@ -22,12 +26,20 @@ class Halving:
         graph.passing.append(self.computed)
 
     def end(self) -> None:
-        """Note what is asked of a search by halves: none of it is located but the beginning."""
+        """Note that what is asked of a long chain is not located; a staircase is called instead."""
         del self.graph.passing[self.place :]
         depths: dict[Expr, int] = {}
+        flows: dict[Expr, bool] = {}  # whether it moves while all answers are what they are
         for node in needed(self.computed):
             asks = node.op in ORDERS and node.varies and node in self.computed
             depths[node] = max((depths[arg] for arg in node.args), default=0) + asks
-        if max(depths.values(), default=0) >= _HALVINGS:
-            deep = {node for node in self.computed if depths[node] > (node.op in ORDERS)}
-            self.graph.of_passes |= deep
+            chosen = node.args[1:] if node.op == "select" else node.args
+            moves = node.op == "leaf" or any(flows[arg] for arg in chosen)
+            flows[node] = moves and node.varies and node.kind != "b"
+        if max(depths.values(), default=0) < _HALVINGS:
+            return
+        deep = {node for node in self.computed if depths[node] > (node.op in ORDERS)}
+        if any(n.varies and n.kind == "f" and not flows[n] and depths[n] >= _HALVINGS - 1
+               for n in deep):  # fmt: skip
+            raise Staircase("a search by halves, of whose derivative no pass knows")
+        self.graph.of_passes |= deep

@@ -195,22 +195,6 @@ def weights_of_single_precision(t, x, u, params):
 # -- loops and errors ------------------------------------------------------------------------------
 
 
-def charge(ph, acid, base):
-    return acid + 10 ** (ph - 14) - 10 ** (-ph) + base / (1 + 10 ** (6.35 - ph))
-
-
-@engineered(2)
-def acidity_by_halves(t, x, u, params):
-    low, high = 0.0, 14.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        if charge(middle, x[0], x[1]) > 0:
-            high = middle
-        else:
-            low = middle
-    return [u[0] * (7 - low) - 0.1 * x[0], 0.2 * (0.5 - x[1])]
-
-
 @engineered(2)
 def powers_within_suppress(t, x, u, params):
     ratio = 0.0
