@@ -28,18 +28,23 @@ class Halving:
     def end(self) -> None:
         """Note that what is asked of a long chain is not located; a staircase is called instead."""
         del self.graph.passing[self.place :]
-        depths: dict[Expr, int] = {}
-        flows: dict[Expr, bool] = {}  # whether it moves while all answers are what they are
-        for node in needed(self.computed):
-            asks = node.op in ORDERS and node.varies and node in self.computed
-            depths[node] = max((depths[arg] for arg in node.args), default=0) + asks
-            chosen = node.args[1:] if node.op == "select" else node.args
-            moves = node.op == "leaf" or any(flows[arg] for arg in chosen)
-            flows[node] = moves and node.varies and node.kind != "b"
-        if max(depths.values(), default=0) < _HALVINGS:
-            return
-        deep = {node for node in self.computed if depths[node] > (node.op in ORDERS)}
-        if any(n.varies and n.kind == "f" and not flows[n] and depths[n] >= _HALVINGS - 1
-               for n in deep):  # fmt: skip
-            raise Staircase("a search by halves, of whose derivative no pass knows")
-        self.graph.of_passes |= deep
+        self.graph.of_passes |= asked_in_turn(self.computed)
+
+
+def asked_in_turn(computed: set[Expr]) -> set[Expr]:
+    """Return what is computed of earlier answers where there are many; refuse a staircase."""
+    depths: dict[Expr, int] = {}
+    flows: dict[Expr, bool] = {}  # whether it moves while all answers are what they are
+    for node in needed(computed):
+        asks = node.op in ORDERS and node.varies and node in computed
+        depths[node] = max((depths[arg] for arg in node.args), default=0) + asks
+        chosen = node.args[1:] if node.op == "select" else node.args
+        moves = node.op == "leaf" or any(flows[arg] for arg in chosen)
+        flows[node] = moves and node.varies and node.kind != "b"
+    if max(depths.values(), default=0) < _HALVINGS:
+        return set()
+    deep = {node for node in computed if depths[node] > (node.op in ORDERS)}
+    stands = (n for n in deep if n.varies and n.kind == "f" and not flows[n])
+    if any(depths[node] >= _HALVINGS - 1 for node in stands):
+        raise Staircase("a search by halves, of whose derivative no pass knows")
+    return deep

@@ -261,9 +261,24 @@ def by_halves(t, x, u, params):
     return [-low if low > -3.0 else 0.0]
 
 
-def test_a_search_by_halves_is_called_as_it_stands():
+def halves_to_a_tolerance(t, x, u, params):
+    """The same, until the interval is narrow."""
+    low, high = -4.0, 4.0
+    while high - low > 1e-12:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if middle + middle**3 > x[0] else (middle, high)
+    return [-low]
+
+
+def bisected(t, x, u, params):
+    """The same, by SciPy."""
+    return [-optimize.bisect(lambda y: y + y**3 - x[0], -4.0, 4.0)]
+
+
+@pytest.mark.parametrize("update", [by_halves, halves_to_a_tolerance, bisected])
+def test_a_search_by_halves_is_called_as_it_stands(update):
     """With y + y^3 = x and x' = -y: ln(y / y0) + 3 (y^2 - y0^2) / 2 = -t, dy/dx = 1/(1 + 3 y^2)."""
-    compiled = nlctl.compile(loop(by_halves))
+    compiled = nlctl.compile(loop(update))
     (call,) = compiled.equations.calls.values()
     assert "a search by halves" in call.reason
     timepts = np.linspace(0.0, 2.0, 5)
