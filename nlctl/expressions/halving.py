@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from .graph import ORDERS, Expr, Graph, Untraceable, needed
 
+_MADE = ("add", "sub", "mul", "div")  # no choice among constants, as of a table
 _HALVINGS = 16  # comparisons, each of what the one before has chosen
 
 
@@ -44,7 +45,7 @@ def asked_in_turn(computed: set[Expr]) -> set[Expr]:
     if max(depths.values(), default=0) < _HALVINGS:
         return set()
     deep = {node for node in computed if depths[node] > (node.op in ORDERS)}
-    stands = (n for n in deep if n.varies and n.kind == "f" and not flows[n])
+    stands = (n for n in deep if n.op in _MADE and n.varies and n.kind == "f" and not flows[n])
     if any(depths[node] >= _HALVINGS - 1 for node in stands):
         raise Staircase("a search by halves, of whose derivative no pass knows")
     return deep
