@@ -19,6 +19,7 @@ import numpy as np
 
 from .arrays import Tracer, scalar
 from .graph import Expr, Graph, Untraceable
+from .halving import asked_in_turn
 from .merged import call_instead, chosen, later, truth_test, truth_value
 from .operators import elementwise
 
@@ -60,8 +61,21 @@ class PassWriter(ast.NodeTransformer):
 
     def visit_For(self, node: ast.For) -> Any:
         self.generic_visit(node)
-        ends = _leaves(node, ast.Break) and not _leaves(node, ast.Return)
-        return (self._loop(node) if ends else None) or node
+        if _leaves(node, ast.Return):
+            return node
+        if _leaves(node, ast.Break):
+            return self._loop(node) or node
+        return self._counted(node)
+
+    def _counted(self, node: ast.For) -> Any:
+        """Note the passes of a loop that asks in each: there may be a search by halves in it."""
+        if not any(isinstance(part, ast.If | ast.IfExp | ast.Call) for part in ast.walk(node)):
+            return node
+        self.count += 1
+        name = f"passes@{self.count}"
+        begin = ast.Assign([ast.Name(name, ast.Store())], call_instead("passes"))
+        end = ast.Expr(_method(name, "end"))
+        return [_placed(ast.copy_location(s, node), node) for s in (begin, node, end)]
 
     def _loop(
         self, node: ast.For | ast.While, rest: Sequence[ast.stmt] | None = None
@@ -363,6 +377,7 @@ class Loop:
         if self.passes:
             self.graph.passing.pop()
         self.graph.of_passes |= self.later - self.first
+        asked_in_turn(self.first | self.later)  # which refuses a staircase
         if self.is_cut:
             self.graph.limited(self.graph.op("not", self.running))
             self.running = self.graph.const(False)

@@ -9,7 +9,7 @@ import functools
 import math
 import operator
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -27,6 +27,7 @@ from .arrays import (
 )
 from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable, needed
 from .integers import shifted, with_bits
+from .promoted import is_numpys, widened
 
 _Range = tuple[float, float]
 _EVERYTHING = (-math.inf, math.inf)
@@ -114,7 +115,7 @@ def elementwise(graph: Graph, name: str, *operands: object) -> Tracer:
         special = next(v for v in operands if isinstance(v, Special))
     if special is not None:
         return special.operation(graph, name, operands)
-    arrays = [traced(graph, v) for v in operands]
+    arrays = [traced(graph, v) for v in widened(graph, operands)]
     if all(not a.values.shape and a.axis is None for a in arrays):  # most are numbers
         return scalar(graph, graph.op(name, *(a.only for a in arrays)))
     longs = {(a.ndim - a.axis, a.length) for a in arrays if a.axis is not None}
@@ -185,7 +186,7 @@ def _matrix_product(graph: Graph, a: object, b: object) -> Any:
         return Special.of_complex(graph, a) @ b
     if any(isinstance(v, Special) or hasattr(type(v), "_forwards") for v in (a, b)):
         return NotImplemented
-    return product(traced(graph, a), traced(graph, b))
+    return product(*(traced(graph, v) for v in widened(graph, (a, b))))
 
 
 def _batched(a: Tracer, b: Tracer) -> Tracer:
@@ -335,11 +336,23 @@ def _power(base: Any, exponent: Any) -> Any:
         return elementwise(exponent.graph, "power", base, exponent)
     if not isinstance(base, Tracer):
         return base**exponent
+    whole = isinstance(exponent, int | np.integer) and abs(exponent) <= 64
     if base.graph.attempts and not is_numpys(base.graph, base):
-        raise Untraceable("try around a power of what may be Python's own numbers")
-    if isinstance(exponent, int | np.integer) and abs(exponent) <= 64:
-        return mapped_cells(base, lambda e: base.graph.power(e, int(exponent)))
+        if not (whole and exponent > 0 and base.is_pythons and base.only.kind == "f"):
+            raise Untraceable("try around a power of what may be Python's own numbers")
+        _ask_size(base, int(exponent))
+    if whole:
+        powers = mapped_cells(base, lambda e: base.graph.power(e, int(exponent)))
+        return _as_their_result(powers, [base])
     return elementwise(base.graph, "power", base, exponent)
+
+
+def _ask_size(base: Tracer, exponent: int) -> None:
+    """Raise an error where the power of a float of Python's own is too large."""
+    graph, infinity = base.graph, base.graph.const(math.inf)
+    power, size = (graph.op("absolute", graph.power(base.only, n)) for n in (exponent, 1))
+    too_large = graph.op("and", graph.op("eq", power, infinity), graph.op("lt", size, infinity))
+    graph.guard(graph.op("not", too_large), OverflowError)
 
 
 _OF_BITS: dict[str, Callable[..., Any]] = dict.fromkeys(("and", "or", "xor"), bits)
@@ -398,31 +411,6 @@ def _ask_divisor(graph: Graph, a: object, b: object) -> None:
         graph.guard(elementwise(graph, "ne", b, 0.0).only, ZeroDivisionError)
     elif not (is_numpys(graph, a) or is_numpys(graph, b)):
         raise Untraceable("try around a division of what may be Python's own numbers")
-
-
-def is_numpys(graph: Graph, value: object) -> bool:
-    """Whether a number is known to be one of NumPy's: it is made of states or inputs."""
-    if not isinstance(value, Tracer) or value.shape:
-        return isinstance(value, Tracer | np.ndarray | np.generic)
-    return not value.is_pythons and _comes_from_arrays(value.only, graph.of_python)
-
-
-def _comes_from_arrays(expr: Expr, without: Collection[Expr]) -> bool:
-    """Whether an expression depends on states or inputs, other than by some expressions."""
-    known: dict[Expr, bool] = dict.fromkeys(without, False)
-    waiting = [expr]
-    while waiting:
-        node = waiting[-1]
-        if node in known:
-            waiting.pop()
-        elif node.op in ("call", "solve", "leaf"):
-            known[node] = node.op != "leaf" or node.data[0] in ("x", "u")
-        elif missing := [arg for arg in node.args if arg not in known]:
-            waiting += missing
-        else:
-            every = node.op == "select"  # either may be what comes out
-            known[node] = (all if every else any)(known[a] for a in node.args[every:])
-    return known[expr]
 
 
 def _in_place(name: str) -> Callable[[Any, Any], Any]:

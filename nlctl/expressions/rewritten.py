@@ -13,18 +13,22 @@ import contextlib
 import copy
 import dis
 import functools
+import sys
 from collections.abc import Callable, Mapping, Set
-from types import CodeType, FunctionType, NoneType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
+from .halving import Halving
 from .iterated import NOT_RETURNED, Loop, PassWriter
 from .library.ordered import sorted_list
+from .library.table import unwrapped
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
-from .operators import elementwise, is_numpys
+from .operators import elementwise
+from .promoted import is_numpys
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
@@ -61,8 +65,11 @@ def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
     where = "a lambda" if isinstance(tree, ast.Lambda) else "a method that calls super()"
     if ast.Try in kinds:
         raise Untraceable(f"try in {where}")
-    constants = {type(n.value) for n in ast.walk(tree) if isinstance(n, ast.Constant)}
-    is_asked = bool(kinds & {ast.Is, ast.IsNot}) and (merging or bool in constants)
+    compared = [n for n in ast.walk(tree) if isinstance(n, ast.Compare)]
+    asked = [n for n in compared if {*map(type, n.ops)} & {ast.Is, ast.IsNot}]
+    others = [part.value if isinstance(part, ast.Constant) else ...
+              for n in asked for part in n.comparators]  # fmt: skip
+    is_asked = bool(asked) and (merging or any(other is not None for other in others))
     if is_asked or kinds & {ast.MatchSingleton, ast.MatchClass}:
         raise Untraceable(f"identity or a class in a pattern in {where}")
 
@@ -92,6 +99,7 @@ def _inside(code: CodeType, name: str) -> CodeType:
 class _Rewriter(ast.NodeTransformer):
     def __init__(self, names: Mapping[str, Any]) -> None:
         self.names = names
+        self.classes: list[str] = []  # names of those in patterns
 
     def visit_With(self, node: ast.With) -> Any:
         """Write ``try`` for ``with suppress(...)``."""
@@ -178,21 +186,34 @@ class _Rewriter(ast.NodeTransformer):
         kind = ast.MatchClass(ast.Name(name, ast.Load()), [], [], [])
         return ast.copy_location(kind, node)
 
-    def visit_MatchClass(self, node: ast.MatchClass) -> Any:
-        """Refuse: what stands for an object of somebody's is none of its class."""
-        raise Untraceable("a class in a pattern")
+    def visit_Match(self, node: ast.Match) -> Any:
+        """Give names to what asks as `isinstance` does, for the classes in patterns."""
+        named = []
+        for case in node.cases:
+            for pattern in ast.walk(case.pattern):
+                if isinstance(pattern, ast.MatchClass):
+                    name = f"class@{len(self.classes)}"
+                    asks = call_instead("class", pattern.cls)
+                    self.classes.append(name)
+                    named.append(ast.Assign([ast.Name(name, ast.Store())], asks))
+                    pattern.cls = ast.Name(name, ast.Load())
+        self.generic_visit(node)
+        return [*(ast.copy_location(s, node) for s in named), node]
 
     def visit_Compare(self, node: ast.Compare) -> Any:
-        """Ask by a function whether something is True, False or None."""
+        """Ask by a function whether something is True, False, None, or another thing."""
         self.generic_visit(node)
         other = node.comparators[0]
-        is_asked = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
-        if not (is_asked and isinstance(other, ast.Constant)):
+        if not {*map(type, node.ops)} & {ast.Is, ast.IsNot}:
             return node
-        if type(other.value) not in (bool, NoneType):
-            return node
-        none = call_instead("none", node.left)
-        answer = none if other.value is None else call_instead("truth", other, node.left)
+        if len(node.ops) > 1:
+            raise Untraceable("identity among several comparisons")
+        value = other.value if isinstance(other, ast.Constant) else ...
+        if value is None:
+            answer = call_instead("none", node.left)
+        else:
+            name = "truth" if type(value) is bool else "same"
+            answer = call_instead(name, other, node.left)
         return answer if isinstance(node.ops[0], ast.Is) else ast.UnaryOp(ast.Not(), answer)
 
     def visit_Raise(self, node: ast.Raise) -> Any:
@@ -264,6 +285,9 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("item"): functools.partial(_item, graph),
         INSTEAD_NAME.format("slice"): slice,
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
+        INSTEAD_NAME.format("same"): lambda a, b: _behind(a) is _behind(b),
+        INSTEAD_NAME.format("class"): _pattern_type,
+        INSTEAD_NAME.format("passes"): lambda: Halving(graph),
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
@@ -390,6 +414,39 @@ class _TruthType(type):
 
     def __instancecheck__(cls, thing: Any) -> bool:
         return _is_truth(*cls.of, thing)  # type: ignore[attr-defined]
+
+
+class _PatternType(type):
+    """A class for patterns, of which is what a traced function's `isinstance` says."""
+
+    def __new__(cls, kind: Any, is_one: Callable[..., bool]) -> Any:
+        real = unwrapped(kind)
+        plain = real if real in _OF_THEMSELVES else int if real is bool else object
+        given: dict[str, Any] = {"asked": (is_one, kind)}
+        if plain is object:
+            given["__match_args__"] = getattr(real, "__match_args__", ())
+        return super().__new__(cls, "Pattern", (plain,), given)
+
+    def __init__(cls, *_: object) -> None:
+        super().__init__(cls)
+
+    def __instancecheck__(cls, thing: Any) -> bool:
+        is_one, kind = cls.asked  # type: ignore[attr-defined]
+        return is_one(thing, kind)
+
+
+def _behind(value: Any) -> Any:
+    """Return the class or object that something stands for."""
+    return getattr(unwrapped(value), "__dict__", {}).get("_real", unwrapped(value))
+
+
+def _pattern_type(kind: Any) -> Any:
+    """Return what stands for a class in a pattern, with what is `isinstance` where it is asked."""
+    return _PatternType(kind, sys._getframe(1).f_builtins["isinstance"])
+
+
+# whose patterns have the object itself in brackets: ``case float(value)``
+_OF_THEMSELVES = (float, int, str, list, tuple, dict, set, frozenset, bytes)
 
 
 class NumberKeys(dict[Any, Any]):

@@ -29,6 +29,7 @@ from ..upstream.numba_internals import CPUDispatcher
 from . import staged
 from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
+from .gains import computes_gains
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
 from .library.linear_maps import enter_linear_maps
@@ -199,7 +200,7 @@ class Stage:
                 return value  # they look at types, defaults and names alone
             if staged.is_of_a_library(value):
                 return self._library("", value)
-            return self.copied(value)
+            return self.for_numbers(value) if computes_gains(value) else self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
@@ -258,7 +259,7 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
-        if (type(real).__name__, "pdf") in WRITTEN:  # a law of probability
+        if type(real).__module__.startswith("scipy.stats"):  # a family of laws
             return self._instead_of_object(real)
         if (getattr(real, "__module__", None) or "").startswith("scipy.optimize"):
             search = roots().get(real)

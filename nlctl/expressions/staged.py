@@ -12,8 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .arrays import Special, Tracer, traced
+from .arrays import Special, Tracer, scalar, traced
 from .graph import Graph, MessageWritten, Untraceable
+from .library.laws import LAW_METHODS, FrozenLaw, is_law, of_law
 from .library.rotations import enter_rotations
 from .library.rows import chosen_rows, is_table
 from .library.sparse import is_sparse, product_of
@@ -153,8 +154,11 @@ class StagedObject:
         ):
             getter = attribute.fget if isinstance(attribute, property) else attribute.func
             return stage.copied(getter)(self)
-        if isinstance(attribute, FunctionType) and not is_of_a_library(real):
+        of_formula = is_law(real) and name.startswith("_")  # of a family: SciPy's, in Python
+        if isinstance(attribute, FunctionType) and (of_formula or not is_of_a_library(real)):
             return functools.partial(stage.copied(attribute), self)
+        if is_law(real) and name in LAW_METHODS:
+            return functools.partial(_of_held_law, self, name)
         if name == "ev" and is_of_a_library(real):  # a spline of two variables, point by point
             return functools.partial(self, grid=False)
         if name == "dot" and is_sparse(real):
@@ -172,7 +176,19 @@ class StagedObject:
         raise Untraceable("a function that changes an object")
 
     def __call__(self, *arguments: object, **options: object) -> Any:
+        if is_law(self._real) and holds_tracers([*arguments, *options.values()]):
+            return FrozenLaw(self._stage.graph, self, arguments, options)
         return self._stage.called_object(self._real)(*arguments, **options)
+
+
+def _of_held_law(law: StagedObject, name: str, x: Any, *numbers: Any, **named: Any) -> Any:
+    """Return a function of a law of probability, which may have its numbers already."""
+    real, stage = law.__dict__["_real"], law.__dict__["_stage"]
+    if not holds_tracers([x, *numbers, *named.values()]):
+        return stage.for_numbers(getattr(real, name))(x, *numbers, **named)
+    if not hasattr(real, "dist"):
+        return of_law(stage.graph, law, name, x, *numbers, **named)
+    return of_law(stage.graph, StagedObject(real.dist, stage), name, x, *real.args, **real.kwds)
 
 
 def _forwarded(name: str) -> Callable[..., Any]:
@@ -305,6 +321,20 @@ class Ufunc:
         """Return all results of an element of one and of the other."""
         a, b = _base(self.graph, a), _base(self.graph, b)
         return self(a.reshape(a.shape + (1,) * b.ndim), b)
+
+    def at(self, array: Any, indices: Any, *others: Any) -> None:
+        """Change elements in place, one after the other: a place may come several times."""
+        known = settled(indices)
+        if not isinstance(array, Tracer) or holds_tracers(known):
+            raise Untraceable(f"{self.real.__name__}.at of places that depend on the state")
+        places = np.arange(array.size).reshape(array.shape)[known]
+        values = [traced(self.graph, v).elements() for v in others]
+        if any(v.shape not in ((), np.shape(places)) for v in values):  # NumPy 2.4 reads beyond
+            raise Untraceable(f"{self.real.__name__}.at of values that are repeated")
+        given = [np.broadcast_to(v, np.shape(places)).ravel() for v in values]
+        for k, place in enumerate(np.ravel(places)):
+            key = tuple(map(int, np.unravel_index(place, array.shape)))
+            array[key] = self(array[key], *(scalar(self.graph, v[k]) for v in given))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.real, name)

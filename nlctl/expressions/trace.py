@@ -13,7 +13,6 @@ import functools
 import math
 import random
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from .graph import (
     Untraceable,
     catchable,
 )
+from .halving import Staircase
 from .operators import elementwise
 from .rewritten import Unfollowed, is_raised
 from .stage import Stage
@@ -68,8 +68,11 @@ def _in_few_ways(
     except Untraceable:
         if left[0] >= 0:
             raise
-    with suppress(Untraceable):
+    try:
         return _traced(graph, function, arguments, [PATHS, PATHS], merging=True)
+    except Untraceable as error:
+        if isinstance(error.__cause__, Staircase):
+            raise
     return _traced(graph, function, arguments, [PATHS, PATHS])
 
 

@@ -210,16 +210,24 @@ HEIR = Heir()
 
 @pytest.mark.parametrize("above", [0.0, 3.0])
 def test_what_cannot_be_asked_on_expressions_is_called(above):
-    """Words that stay as they are: of a lambda, of a method that calls super(), of a class."""
+    """Words that stay as they are: of a lambda, of a method that calls super()."""
     for source in (
         lambda t, x, u, params: [1.0 if (float(x[0]) > 1.0) is True else 2.0],
         lambda t, x, u, params: [HEIR.value(x[0], float(x[0]) > 1.0)],
-        _by_class,
+        lambda t, x, u, params: [1.0 if type(HEIR) is Heir else x[0]],
     ):
         system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
         compiled = nlctl.compile(system)
         assert compiled.equations.calls
         assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_an_object_from_outside_is_of_its_class_in_a_pattern(above):
+    system = ct.nlsys(_by_class, None, states=1, inputs=1, outputs=1)
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
 
 
 def _by_class(t, x, u, params):
@@ -244,3 +252,42 @@ def test_where_nan_is_sorted_the_function_is_called():
     np.testing.assert_allclose(response.outputs[:, -1], np.exp(-1), rtol=1e-6)
     called = nlctl.input_output_response(compiled, [0.0, 1.0], -1.0, np.ones(6))
     np.testing.assert_allclose(called.outputs[:, -1], np.exp(-1), rtol=1e-6)
+
+
+KEYS = {1: 2.0, 2: 3.0}
+
+
+def _types(t, x, u, params):
+    numbers, text = {1: x[0], 2: 1.0}, f"{x[0]}"
+    kinds = (type(numbers) is dict, type(KEYS) == dict, type(text) is str)  # noqa: E721
+    return [numbers[1] if all(kinds) and isinstance(np.tanh, object) else 5.0]
+
+
+@pytest.mark.parametrize("source", [
+    lambda t, x, u, params: [1.0 if isinstance(np.tanh, np.ufunc) else x[0]],
+    lambda t, x, u, params: [1.0 if type(np.tanh) == type(np.sin) else x[0]],  # noqa: E721
+])  # fmt: skip
+def test_the_type_of_a_function_is_asked_where_it_stands(source):
+    """In a trace something else stands for it."""
+    compiled = nlctl.compile(ct.nlsys(source, None, states=1, inputs=1, outputs=1))
+    assert compiled.equations.calls
+    assert compiled.dynamics(0.0, [0.5], [0.0]) == [1.0]
+
+
+def test_types_of_what_stands_for_others_are_theirs():
+    compiled = nlctl.compile(ct.nlsys(_types, None, states=1, inputs=1, outputs=1))
+    assert not compiled.equations.calls
+    assert compiled.dynamics(0.0, [0.5], [0.0]) == [0.5]
+
+
+def test_values_that_are_repeated_over_places_are_left_to_numpy():
+    """NumPy 2.4 reads beyond the end of the two of them."""
+
+    def update(t, x, u, params):
+        sums = np.zeros(3)
+        np.add.at(sums, np.array([[0, 1], [1, 2]]), x[:2])
+        return sums
+
+    compiled = nlctl.compile(ct.nlsys(update, None, states=3, inputs=1, outputs=3))
+    (call,) = compiled.equations.calls.values()
+    assert "repeated" in call.reason

@@ -247,3 +247,62 @@ def test_a_function_that_other_integers_alone_make_opaque_is_named_in_the_log(ca
     response = nlctl.input_output_response(system, [0, 1], initial_state=[1.0], params={"n": 2})
     assert response.states[0, -1] == pytest.approx(0.5, abs=1e-6)  # x' = -x^2
     assert "the update function of block 's' is called back in Python" in caplog.text
+
+
+def by_halves(t, x, u, params):
+    """y + y^3 = x by halving an interval so many times: a staircase of 2^45 steps."""
+    low, high = -4.0, 4.0
+    for _ in range(45):
+        middle = 0.5 * (low + high)
+        if middle + middle**3 > x[0]:
+            high = middle
+        else:
+            low = middle
+    return [-low if low > -3.0 else 0.0]
+
+
+def halves_to_a_tolerance(t, x, u, params):
+    """The same, until the interval is narrow."""
+    low, high = -4.0, 4.0
+    while high - low > 1e-12:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if middle + middle**3 > x[0] else (middle, high)
+    return [-low]
+
+
+def bisected(t, x, u, params):
+    """The same, by SciPy."""
+    return [-optimize.bisect(lambda y: y + y**3 - x[0], -4.0, 4.0)]
+
+
+@pytest.mark.parametrize("update", [by_halves, halves_to_a_tolerance, bisected])
+def test_a_search_by_halves_is_called_as_it_stands(update):
+    """With y + y^3 = x and x' = -y: ln(y / y0) + 3 (y^2 - y0^2) / 2 = -t, dy/dx = 1/(1 + 3 y^2)."""
+    compiled = nlctl.compile(loop(update))
+    (call,) = compiled.equations.calls.values()
+    assert "a search by halves" in call.reason
+    timepts = np.linspace(0.0, 2.0, 5)
+    response = nlctl.input_output_response(compiled, timepts, initial_state=10.0)
+    y = np.array([np.roots([1, 0, 1, -x])[-1].real for x in response.states[0]])
+    np.testing.assert_allclose(np.log(y / 2) + 1.5 * (y**2 - 4), -timepts, atol=1e-5)
+    with pytest.warns(errors.InexactWarning):
+        slope = compiled.linearize([10.0], []).A
+    np.testing.assert_allclose(slope, -1 / 13, rtol=1e-4)
+
+
+def counted_above(t, x, u, params):
+    """How many of a few numbers are above a state: a loop of passes, and each of them jumps."""
+    count = 0.0
+    for limit in (0.25, 0.5, 0.75):
+        if x[0] < limit:
+            count = count + 1.0
+    return [-1.0 - count]
+
+
+def test_jumps_in_few_passes_are_located():
+    """x falls at 1, 2, 3 and 4: from 1 to 1/4 in 1/4 + 1/8 + 1/12, then at 4."""
+    compiled = nlctl.compile(loop(counted_above))
+    assert len(compiled.equations.conditions.located) == 3
+    end = 1 / 4 + 1 / 8 + 1 / 12 + 1 / 8
+    response = nlctl.input_output_response(compiled, [0.0, end], initial_state=1.0)
+    np.testing.assert_allclose(response.states[0, -1], -0.25, atol=1e-12)

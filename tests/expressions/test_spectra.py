@@ -7,6 +7,7 @@ from scipy.interpolate import RectBivariateSpline
 from nlctl.expressions.arrays import leaf_vector
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Graph
+from nlctl.expressions.library.rotated import singular_by_rotations, symmetric_by_rotations
 from nlctl.expressions.library.spectra import eigvals, pinv
 from nlctl.expressions.library.splines import called_object
 
@@ -57,3 +58,33 @@ def test_a_surface_of_scipy(kx, ky):
     found = values(lambda g, p: called_object(g, thing, p[0], p[1], grid=False), (2,), points)
     for p, value in zip(points, found, strict=True):
         np.testing.assert_allclose(value, thing.ev(*p), rtol=1e-12, atol=1e-13)
+
+
+def symmetric(a):
+    """The symmetric part of a matrix."""
+    return 0.5 * (a + a.T)
+
+
+@pytest.mark.parametrize("rows", [3, 4, 5])
+def test_eigenvalues_of_symmetric_matrices_by_rotations(rows):
+    """Of random ones, of equal eigenvalues, of blocks, of sizes that differ by twelve decades."""
+    graded = np.diag(10.0 ** np.linspace(-12, 0, rows))
+    turned, _ = np.linalg.qr(RNG.normal(size=(rows, rows)))
+    twice = turned @ np.diag([2.0, 2.0, *[-1.0] * (rows - 2)]) @ turned.T
+    matrices = [symmetric(a) for a in RNG.normal(size=(40, rows, rows))]
+    matrices += [np.zeros((rows, rows)), np.ones((rows, rows)), -np.eye(rows), symmetric(twice)]
+    matrices += [graded, symmetric(turned @ graded @ turned.T)]
+    found = values(symmetric_by_rotations, (rows, rows), matrices)
+    for a, one in zip(matrices, found, strict=True):
+        size = max(np.abs(a).max(), 1e-300)
+        np.testing.assert_allclose(one.real, np.linalg.eigvalsh(a), rtol=0, atol=2e-14 * size)
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (2, 5), (4, 3)])
+def test_singular_values_by_rotations(shape):
+    """Their number is that of the shorter side; of equal columns all but one are 0."""
+    matrices = [*RNG.normal(size=(40, *shape)), np.ones(shape), np.zeros(shape), np.eye(*shape)]
+    found = values(singular_by_rotations, shape, matrices)
+    for a, one in zip(matrices, found, strict=True):
+        exact = np.linalg.svd(a, compute_uv=False)
+        np.testing.assert_allclose(one.real, exact, rtol=0, atol=2e-14 * (1 + exact[0]))

@@ -1,6 +1,7 @@
 """The gamma function and its logarithm: Stirling's series, far enough to the right.
 
-Sources: DLMF 5.5.1 (recurrence), 5.5.3 (reflection), 5.11.1 (series).
+Sources: DLMF 5.5.1 (recurrence), 5.5.3 (reflection), 5.11.1 (series); of the incomplete ones
+8.4.6 and 8.4.9 to 8.4.14 (integers and halves), 8.7.1 (series).
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ import math
 from functools import reduce
 from typing import Any
 
-from .table import Facade
+from ..graph import Untraceable
+from ..operators import elementwise
+from .table import Facade, known_numbers
 
 _STEPS = 8  # z + 8 >= 8.5: what the series leaves out is below 3e-16
 # B_2k / (2k (2k - 1)) of Bernoulli's numbers
@@ -51,3 +54,38 @@ def _stirling(np: Facade, z: Any) -> Any:
     square = 1.0 / (far * far)
     series = reduce(lambda total, c: total * square + c, reversed(_SERIES))
     return (far - 0.5) * np.log(far) - far + 0.5 * math.log(2 * math.pi) + series / far
+
+
+_MOST = 40.0  # the largest exponent whose terms are written out
+
+
+def _exponent(a: Any) -> float:
+    """Return the exponent of an incomplete gamma function, an integer or a half one."""
+    number = known_numbers(a, "exponents of the incomplete gamma function")
+    if number.size != 1 or not 0.0 < number.item() <= _MOST or number.item() % 0.5:
+        raise Untraceable("the incomplete gamma function of an exponent that is not a half integer")
+    return float(number.item())
+
+
+def upper_gamma(np: Facade, a: Any, x: Any) -> Any:
+    """The part of the gamma function's integral beyond x, by a sum of a few terms."""
+    exponent = _exponent(a)
+    near = np.minimum(x, 1e3)  # beyond, exp(-x) is 0
+    begin = exponent % 1.0
+    value = elementwise(np.graph, "erfc", np.sqrt(near)) if begin else 0.0
+    term = np.exp(-near) * (np.sqrt(near) / math.gamma(1.5) if begin else 1.0)
+    for k in range(int(exponent)):
+        value = value + term
+        term = term * near / (k + 1.0 + begin)
+    return np.where(x < 0.0, math.nan, value)
+
+
+def lower_gamma(np: Facade, a: Any, x: Any) -> Any:
+    """The part up to x: by a series where that is the smaller one."""
+    exponent, total = _exponent(a), 1.0
+    near = np.minimum(np.maximum(x, 0.0), exponent + 1.0)
+    for k in range(int(40 + 2 * exponent), 0, -1):
+        total = 1.0 + near / (exponent + k) * total
+    small = np.power(near, exponent) * np.exp(-near) / math.gamma(exponent + 1.0) * total
+    beyond = upper_gamma(np, exponent, x)
+    return np.where(x < exponent + 1.0, np.where(x < 0.0, math.nan, small), 1.0 - beyond)

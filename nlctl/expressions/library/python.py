@@ -9,7 +9,7 @@ import heapq
 import math
 import sys
 from collections.abc import Callable
-from types import FunctionType, NoneType
+from types import BuiltinFunctionType, FunctionType, MethodType, NoneType
 from typing import Any
 
 import numpy as np
@@ -18,13 +18,15 @@ from ..arrays import Tracer, python_number, scalar, traced
 from ..decimals import to_decimals
 from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
-from ..operators import elementwise, is_numpys
+from ..operators import elementwise
+from ..promoted import is_numpys
 from .ordered import extreme, first_ones, sorted_things
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
+_FUNCTIONS = (FunctionType, MethodType, BuiltinFunctionType, functools.partial)
 _EXACT = 22  # the largest power of ten that is a float
 # of a kind of numbers: those of Python and of NumPy
 NUMBER_SAMPLES = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
@@ -97,7 +99,10 @@ class Builtins:
     def _builtin(self, name: str, real: Any) -> Any:
         is_error = isinstance(real, type) and issubclass(real, BaseException)
         safe = name in _SAFE or is_error or not callable(real) or name == "__build_class__"
-        return real if safe else self.stage.for_numbers(real)
+        if safe:
+            return real
+        of_numbers = self.stage.for_numbers(real)
+        return NumberType(real, of_numbers) if isinstance(real, type) else of_numbers
 
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):
@@ -158,6 +163,8 @@ class Builtins:
         both = (*kinds, *(originals[k] for k in kinds if k in originals))
         if isinstance(thing, Tracer):
             return self._is_number(thing, both)
+        if callable(thing) and any(k in both for k in (*_FUNCTIONS, np.ufunc)):
+            raise Untraceable("the type of a function")
         real = thing.__dict__["_real"] if hasattr(type(thing), "_forwards") else thing
         return isinstance(real, both)
 
@@ -194,7 +201,14 @@ class Builtins:
             raise Untraceable("the type of what is only known when it runs")
         if hasattr(type(thing), "_forwards"):
             return self.stage.instead(type(thing.__dict__["_real"]))
-        return type(thing, *rest)
+        if rest:
+            return type(thing, *rest)
+        kind = thing.__class__
+        stands_for_another = kind.__module__.startswith("nlctl.expressions.")
+        if callable(thing) and (stands_for_another or isinstance(thing, _FUNCTIONS)):
+            raise Untraceable("the type of a function")
+        known = (cls for cls in kind.__mro__ if cls.__module__ == "builtins")
+        return next(known) if stands_for_another else kind
 
     def _super(self, *given: Any) -> Any:
         frame = sys._getframe(1)

@@ -17,6 +17,7 @@ from .table import WRITTEN
 
 SMALL_ANGLE = 1e-3  # rad, below which SciPy takes a series
 _AXES = "xyz"
+_ORTHOGONAL = 1e-13  # what rounding leaves of a product of rotations, and less than SciPy asks for
 
 
 class Turn(Special):
@@ -191,6 +192,32 @@ def from_euler(graph: Graph, seq: str, angles: object, degrees: bool = False) ->
     return Turn(graph, rotation or [0.0, 0.0, 0.0, 1.0])
 
 
+def from_matrix(graph: Graph, matrix: object) -> Turn:
+    """Return the rotation of an orthogonal matrix; of another SciPy takes the nearest one."""
+    m, op = traced(graph, matrix), functools.partial(elementwise, graph)
+    if m.shape != (3, 3):
+        raise Untraceable("several rotations at once")
+    apart = op("absolute", product(m.T, m) - np.eye(3))
+    for part in apart.elements().flat:
+        graph.limited(graph.op("le", part, graph.const(_ORTHOGONAL)))
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
+    sizes = [m[0, 0], m[1, 1], m[2, 2], trace]
+    quats = []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        quat: list[Any] = [None, None, None, m[k, j] - m[j, k]]
+        quat[i], quat[j] = 1.0 - trace + 2.0 * m[i, i], m[j, i] + m[i, j]
+        quat[k] = m[k, i] + m[i, k]
+        quats.append(quat)
+    quats.append([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1.0 + trace])
+    largest, chosen = sizes[0], quats[0]
+    for size, quat in zip(sizes[1:], quats[1:], strict=True):
+        above = op("gt", size, largest)
+        largest = op("select", above, size, largest)
+        chosen = [op("select", above, new, old) for new, old in zip(quat, chosen, strict=True)]
+    return from_quat(graph, chosen)
+
+
 def _identity(graph: Graph) -> Turn:
     """Return the rotation that changes nothing."""
     return Turn(graph, [0.0, 0.0, 0.0, 1.0])
@@ -201,7 +228,7 @@ def enter_rotations() -> Any:
     """Enter the ways to make a rotation; return SciPy's class."""
     from scipy.spatial.transform import Rotation
 
-    for maker in (from_quat, from_rotvec, from_euler, _identity):
+    for maker in (from_quat, from_rotvec, from_euler, from_matrix, _identity):
         WRITTEN[Rotation, maker.__name__.strip("_")] = maker
     return Rotation
 

@@ -17,7 +17,7 @@ from .cells import by_numpy
 from .complex_numbers import ComplexPair
 from .creation import whole_numbers
 from .exponential import expm
-from .gamma import gamma, loggamma_of_size
+from .gamma import gamma, loggamma_of_size, lower_gamma, upper_gamma
 from .integral_functions import bessel, exponential_integral, macdonald, modified_bessel
 from .integrals import fixed_quad, quad
 from .linear_algebra import cholesky_factor, of_bands, of_cholesky, of_triangle, of_triangles
@@ -238,7 +238,29 @@ def _kept_logsumexp(np: Facade, x: object, axis: object) -> Any:
     return top + np.log(np.sum(np.exp(x - top), axis=axis, keepdims=True))
 
 
+def xlogy(np: Facade, x: Any, y: Any) -> Any:
+    """x ln y, 0 where x is."""
+    return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y))
+
+
+def log_ndtr(np: Facade, x: Any) -> Any:
+    """ln of the normal distribution function; far to the left by its series (DLMF 7.12.1)."""
+    root = math.sqrt(0.5)
+    right = np.log1p(-0.5 * _elementwise("erfc", np.graph, root * x))
+    left = np.log(0.5 * _elementwise("erfc", np.graph, -root * np.maximum(x, -30.0)))
+    far = np.minimum(x, -20.0)
+    square = 1.0 / (far * far)
+    series = functools.reduce(lambda total, k: 1.0 - k * square * total, (11, 9, 7, 5, 3, 1), 1.0)
+    tail = -0.5 * far * far - np.log(-far) - 0.5 * math.log(2.0 * math.pi) + np.log(series)
+    return np.where(x > -1.0, right, np.where(x > -20.0, left, np.where(x == x, tail, x)))
+
+
 _FORMULAS = {
+    "log_ndtr": log_ndtr,
+    "chdtr": lambda np, v, x: lower_gamma(np, 0.5 * v, 0.5 * x),
+    "chdtrc": lambda np, v, x: upper_gamma(np, 0.5 * v, 0.5 * x),
+    "gammainc": lower_gamma,
+    "gammaincc": upper_gamma,
     "exp10": lambda np, x: np.power(10.0, x),
     "ndtr": lambda np, x: 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x),
     "huber": huber,
@@ -246,7 +268,7 @@ _FORMULAS = {
     "expit": lambda np, x: 1.0 / (1.0 + np.exp(-1.0 * x)),
     "logit": lambda np, x: np.log(x / (1.0 - x)),
     "log_expit": lambda np, x: -1.0 * np.logaddexp(0.0, -1.0 * x),
-    "xlogy": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y)),
+    "xlogy": xlogy,
     "xlog1py": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y)),
     "softmax": softmax,
     "logsumexp": logsumexp,

@@ -14,6 +14,7 @@ from .complex_numbers import ComplexPair
 from .linear_algebra import NotComputed
 from .orthogonal import pseudoinverse, qr
 from .reductions import sum_along
+from .rotated import singular_by_rotations, symmetric_by_rotations
 from .table import Facade, constant_value, of
 
 __all__: list[str] = []
@@ -59,7 +60,7 @@ def svd(
     graph: Graph, a: object, full_matrices: bool = True, compute_uv: bool = True,
     hermitian: bool = False,
 ) -> Any:  # fmt: skip
-    """Return the singular values of a matrix of two rows and columns, the larger one first."""
+    """Return the singular values of a matrix, the largest one first."""
     values = _singular(graph, _matrix(graph, a))
     if not compute_uv:
         return values
@@ -70,7 +71,7 @@ def svd(
 
 def _singular(graph: Graph, matrix: Tracer) -> Tracer:
     if matrix.shape != (2, 2):
-        raise Untraceable("singular values of a matrix of more than two rows")
+        return singular_by_rotations(graph, matrix)
     ((p, q), (r, s)), np_ = matrix, Facade(graph)
     one, other = np_.hypot(p + s, r - q) * 0.5, np_.hypot(p - s, r + q) * 0.5
     return traced(graph, [one + other, np_.abs(one - other)])
@@ -78,13 +79,15 @@ def _singular(graph: Graph, matrix: Tracer) -> Tracer:
 
 @of(np.linalg.cond)
 def cond(graph: Graph, x: object, p: Any = None) -> Any:
-    """Return the condition number of a matrix of two rows: the ratio of its singular values."""
+    """Return the condition number of a matrix: the ratio of its singular values."""
     matrix, np_ = _matrix(graph, x), Facade(graph)
     if p not in (None, 2):
         raise Untraceable("the condition number of a matrix in another norm")
     values = _singular(graph, matrix)
-    (a, b), (c, d) = matrix
     largest = values[0]
+    if matrix.shape != (2, 2):
+        return np_.where(largest == 0.0, np.inf, largest / values[-1])
+    (a, b), (c, d) = matrix
     smallest = np_.abs(a * d - b * c) / largest
     return np_.where(largest == 0.0, np.inf, largest / smallest)
 
@@ -108,7 +111,7 @@ def eigvalsh(graph: Graph, a: object, UPLO: str = "L") -> Tracer:
     if len(matrix) == 1:
         return matrix[0]
     if matrix.shape != (2, 2):
-        raise Untraceable("eigenvalues of a matrix of more than two rows")
+        return symmetric_by_rotations(graph, matrix)
     (p, _), (q, r) = matrix
     middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
     return traced(graph, [middle - spread, middle + spread])

@@ -71,6 +71,16 @@ class NumberType:
     def __hash__(self) -> int:
         return hash(self.real)
 
+    @property
+    def dtype(self) -> np.dtype:
+        """What NumPy's own arrays, of constants, take it for."""
+        return np.dtype(self.real)
+
+    def __or__(self, other: object) -> Any:
+        return self.real | unwrapped(other)  # type: ignore[operator]
+
+    __ror__ = __or__
+
 
 def unwrapped(value: object) -> Any:
     """Return the type that stands behind a value, any other value as it is."""

@@ -134,7 +134,7 @@ def found_conditions(
     rows, count, beyond = 0, 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
     only_shown = set(needed(list(shown))) - inside
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
-    steep = any(node.op in _STEEP and node.varies for node in moving)
+    steep = any(map(_is_steep, moving))
     # values of parameters: 1 for those that are not known
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
     for condition, node in _undeclared(reader, rates, falls, others, watched):
@@ -159,6 +159,14 @@ def found_conditions(
         pulses=pulses, beyond=beyond, shown=count,
         sharp=_sharp(reader, rates, falls, watched, inside - timed),
     )  # fmt: skip
+
+
+def _is_steep(node: Expr) -> bool:
+    """Whether a rate may have no derivative where an expression is 0."""
+    if node.op == "power" and any(arg.op == "const" for arg in node.args):
+        base, exponent = node.args  # 10^z is smooth, and z^1.5 has a derivative
+        return base.op != "const" and exponent.data < 1.0
+    return node.op in _STEEP and node.varies
 
 
 def _with_levels(graph: Graph, function: Expr) -> Expr:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...expressions.source import cells_of, source_file
-from . import known_calls, made
+from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
 from .values import (
@@ -146,7 +146,7 @@ class Expressions(ast.NodeVisitor):
             self.visit(target.slice)
         if isinstance(base.known, Instance):
             return self.write_object(target, base, value)
-        if isinstance(base.known, ListOf | OneOf):
+        if isinstance(base.known, ListOf | OneOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
         if not base.own:
             text = ast.unparse(target.value)
@@ -217,8 +217,7 @@ class Expressions(ast.NodeVisitor):
         if results:
             return least_upper_bound(results)
         self.operands(plain)
-        of_library = any(isinstance(v.known, Pure) for v in plain)
-        return KnownValue(True, True, known=Pure()) if of_library else FRESH
+        return handed_on.operated(kind, plain)
 
     def operands(self, values: Sequence[KnownValue]) -> None:
         """Check that operators are those of numbers, arrays and containers."""
@@ -234,7 +233,7 @@ class Expressions(ast.NodeVisitor):
             self.operated(type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
-            is_one = is_constant or isinstance(value.known, enum.Enum)
+            is_one = is_constant or isinstance(value.known, enum.Enum | type)
             if is_one and isinstance(part, ast.Constant) and part.value is not None:
                 self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
             if isinstance(test, ast.Is | ast.IsNot) and not is_one:
@@ -366,8 +365,9 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
-            if isinstance(value, BuiltinFunctionType) and isinstance(
-                thing, known_calls.WITH_METHODS
+            if isinstance(value, BuiltinFunctionType) and (
+                isinstance(thing, known_calls.WITH_METHODS)
+                or (isinstance(thing, type) and value.__self__ is thing)
             ):
                 return captured(value)  # a method, a new one each time it is read
             if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):
@@ -378,7 +378,8 @@ class Expressions(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> KnownValue:
         places = tuple(self.visit(part) for part in node.args)
         given = Given(places, {k.arg or "**": self.visit(k.value) for k in node.keywords})
-        if "out" in given.names and not given.names["out"].own:
+        out = given.names.get("out", FRESH)
+        if not out.own or handed_on.holds_others(out):
             raise Impure("writes into an array with out=, which it did not make", CHANGES)
         if isinstance(node.func, ast.Attribute):
             base = self.visit(node.func.value)
@@ -387,6 +388,7 @@ class Expressions(ast.NodeVisitor):
                 self.kept(base, given.every)
                 return bound
         function = self.visit(node.func)
+        given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
         if function.known is getattr and isinstance(places[1].known, str):

@@ -9,24 +9,25 @@ import functools
 import inspect
 import logging
 import re
+import sys
 import warnings
-from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
+from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...expressions.library.table import WRITTEN
+from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
+from .handed_on import handed_on, rows_of_functions, views_of
 from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
-    UNKNOWN_VALUE,
     Bound,
     Cached,
     Given,
@@ -65,7 +66,7 @@ _SEEDED = ("default_rng", "RandomState")
 CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | frozenset | str
               | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
-HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
+HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 
 
@@ -113,17 +114,18 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return KnownValue(True, True, known=known)
     if thing is functools.reduce and not isinstance(places[0].known, Unknown):
         return _reduced(walk, places)
-    if isinstance(thing, enum.EnumType) and len(places) == 1 and not issubclass(thing, enum.Flag):
-        if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
+    if isinstance(thing, enum.EnumType) and len(places) == 1:
+        missing = inspect.getattr_static(thing, "_missing_")
+        if missing not in [vars(cls)["_missing_"] for cls in (enum.Enum, enum.Flag)]:
             raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
-        return element(captured(thing))
+        return FRESH if issubclass(thing, enum.Flag) else element(captured(thing))
     if thing is np.frompyfunc:
         _call_functions(walk, places[:1])
         return KnownValue(True, True, known=Pure())
     if isinstance(thing, np.vectorize):
         _call_functions(walk, [walk.captured(thing, "pyfunc", thing.pyfunc)])
         return FRESH
-    if thing is namedtuple:
+    if thing is namedtuple or thing is NamedTuple:
         return made.named_tuple(given)
     if thing is dataclasses.replace and places:
         return made.replaced_fields(walk, places[0], given.names)
@@ -151,11 +153,15 @@ def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
     if holds:
         _call_functions(walk, parts)
         parts = tuple(v for v in parts if not isinstance(v.known, type))
+        if cls is defaultdict and parts and parts[:1] == given.places[:1]:
+            made_anew = isinstance(parts[0].known, Unknown | None)
+            parts = parts[1:] if made_anew else (walk.call(parts[0], Given()), *parts[1:])
     if issubclass(cls, tuple) and hasattr(cls, "_fields"):
         made.walk_tuple(walk, cls)
         holds = True
     if holds:
-        return KnownValue(True, all(v.own and v.inside for v in parts), True)
+        is_new = cls is not ChainMap or all(v.own for v in parts[:1])  # it writes into that
+        return KnownValue(is_new, all(v.own and v.inside for v in parts), True)
     return made.instance(walk, cls, given)
 
 
@@ -163,10 +169,10 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     """Return what is known of the result of a function or method of Python code."""
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
-        if (type(owner).__name__, thing.__name__) in WRITTEN:
-            return FRESH
         if thing.__name__ in named.OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
-            raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
+            for name in ("args", "kwds") if hasattr(owner, "dist") else ():  # the law's numbers
+                walk.captured(owner, name, getattr(owner, name))
+            return FRESH
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
     if isinstance(owner, re.Pattern | re.Match):
         return KnownValue(True, True, known=Pure())
@@ -190,6 +196,8 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
         module = getattr(thing, "__module__", None) or getattr(owner, "__name__", "")
         text = f"{module}.{name}" if module else name
         raise Impure(f"calls {text}, whose code cannot be read", "write the formula out")
+    if computes_gains(thing):
+        return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
     if isinstance(thing, FunctionType) or thing.__class__.__name__ == "CPUDispatcher":
         return walk.function(function, given)
     if not isinstance(thing, MethodType):
@@ -254,6 +262,8 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if name in named.READING:
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
+        if name == "astype" and given.names.get("copy", captured(True)).known is not True:
+            return forgotten(base)
         return _read(base, name, given.places)
     if name in named.VIEWS or name in ("T", "flat"):
         return forgotten(base)
@@ -373,7 +383,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if thing in MAKING:
         _call_functions(walk, given.places if by_key else given.every)
         inside = all(v.inside for v in places)
-        return KnownValue(True, inside, True, known=_rows(thing, places))
+        return KnownValue(True, inside, True, known=rows_of_functions(thing, places))
     if name == "next":
         _written(places[0], "next()")
         return element(places[0])
@@ -416,28 +426,6 @@ def _check_parts(value: KnownValue, name: str, moves: bool) -> None:
                 check_object(captured(part), f"calls {name}() of a list that holds")
 
 
-def _functions_in(given: Sequence[KnownValue]) -> Any:
-    """Return the choice between the functions in what is gone through, for what calls one."""
-    parts = [element(v) for v in given]
-    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
-    functions = [v for v in parts if isinstance(v.known, kinds)]
-    functions = [
-        v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
-    ]
-    return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
-
-
-def _rows(thing: object, given: Sequence[KnownValue]) -> Any:
-    """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
-    kept = _functions_in(given)
-    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
-        return kept
-    parts = tuple(map(element, given))
-    parts = parts if thing is zip else (FRESH, parts[0])
-    every = all(v.own and v.inside for v in parts)
-    return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
-
-
 def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue:
     name = getattr(thing, "__name__", "")
     if name in _SEEDED and given.places and type(given.places[0].known) is int:
@@ -457,14 +445,34 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if name in named.WRITERS or (module.endswith("operator") and name in named.IN_PLACE):
         _written(given.places[0], f"{name}()")
         return element(given.places[0]) if "heap" in name else FRESH
+    parts = handed_on(module, name, given.places)
+    if parts is not None:
+        return parts
     if module in ("operator", "_operator") and isinstance(thing, type):
         return KnownValue(True, True, known=Pure(gives_parts=True))
     if _makes_objects(thing, module):
         # it may hold what it is given, instead of copies
         return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
-    if name in named.VIEWS or given.names.get("copy", captured(True)).known is not True:
+    for value in given.places[_place_of_out(thing, name) :]:
+        _written(value, f"{name}(..., out)")
+    may_be_it = given.names.get("copy", captured(True)).known is not True
+    if name == "nan_to_num" and may_be_it:
+        _written(given.places[0], f"{name}()")
+    if name in named.LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):
+        several = name in ("broadcast_arrays", "meshgrid")
+        return views_of(given.places if several else given.places[:1])
+    if name == "einsum" and len(given.places) == 2:
+        return forgotten(given.places[1])
+    if name in named.VIEWS or may_be_it or module.startswith("numpy.ma"):
         return forgotten(given.places[0]) if given.places else FRESH
     return FRESH
+
+
+def _place_of_out(thing: object, name: str) -> int:
+    """Return the place from which arguments are arrays that are written into."""
+    if isinstance(thing, np.ufunc):
+        return thing.nin
+    return {"clip": 3, "dot": 2}.get(name, sys.maxsize)
 
 
 def _makes_objects(thing: object, module: str) -> bool:
@@ -484,4 +492,5 @@ def _call_functions(walk: Walk, values: Any) -> None:
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices)
         elif isinstance(thing, Local | Bound | Cached | Instance) or callable(thing):
-            walk.call(value, Given((OUTSIDE,) * 8))
+            count = getattr(thing, "nin", 2 if library(thing) else 8)
+            walk.call(value, Given((OUTSIDE,) * count))

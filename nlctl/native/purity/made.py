@@ -6,13 +6,14 @@ What such an object does is what its class's functions do: these are walked like
 from __future__ import annotations
 
 import abc
+import ast
 import collections
 import dataclasses
 import enum
 import inspect
 from collections.abc import Callable, Mapping
 from types import FunctionType, ModuleType
-from typing import Any, Generic, Protocol
+from typing import Any, Generic, NamedTuple, Protocol
 
 from .values import (
     OUTSIDE,
@@ -187,6 +188,18 @@ def of_class(walk: Walk, base: KnownValue, member: Callable[..., Any]) -> KnownV
     if isinstance(member, FunctionType):
         return KnownValue(True, True, known=Bound(captured(member), Given((base,))))
     return captured(member)
+
+
+def with_field_names(node: ast.Call, function: object, given: Given) -> Given:
+    """Return what makes a named tuple, with its fields where a list has their names."""
+    if not (function is collections.namedtuple or function is NamedTuple) or len(node.args) < 2:
+        return given
+    listed = node.args[1].elts if isinstance(node.args[1], ast.List | ast.Tuple) else []
+    names = [part.elts[0] if isinstance(part, ast.Tuple) else part for part in listed]
+    known = [name.value for name in names if isinstance(name, ast.Constant)]
+    if not names or len(known) < len(names):
+        return given
+    return Given((given.places[0], captured(known), *given.places[2:]), given.names)
 
 
 def named_tuple(given: Given) -> KnownValue:

@@ -3,10 +3,12 @@
 # functions and methods that may return part of what they are given
 VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
          "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
-         "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
-         "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
-         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
-         "to_numpy", "sliding_window_view"}  # fmt: skip
+         "expand_dims", "broadcast_to", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90",
+         "real", "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num",
+         "to_numpy", "sliding_window_view", "asmatrix", "frombuffer", "require",
+         "asarray_chkfinite"}  # fmt: skip
+LISTS_OF_VIEWS = {"broadcast_arrays", "split", "array_split", "hsplit", "vsplit", "dsplit",
+                  "unstack", "meshgrid"}  # fmt: skip
 WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
            "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
            "heappushpop"}  # fmt: skip
@@ -36,7 +38,8 @@ CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "rev
             "rotate"}  # fmt: skip
 # of sparse matrices, what changes them; of laws of probability; of tables of pandas
 OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_zeros", "prune")
-OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
+OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "logsf", "ppf", "pmf", "logpmf", "isf", "mean",
+           "std", "var", "median", "moment", "entropy", "interval", "support")  # fmt: skip
 OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
               "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 # of builtins that return numbers and texts

@@ -16,7 +16,7 @@ import numpy as np
 from ...expressions.source import Definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
-from .known_calls import MEMORY
+from .known_calls import CONTAINERS, MEMORY
 from .local_classes import class_defined_in, constants_in_class
 from .values import (
     FRESH,
@@ -207,8 +207,10 @@ class CallWalker(Expressions):
         self.either([case.body for case in node.cases] + [[]])
 
     def check_pattern(self, pattern: ast.MatchClass) -> None:
-        """Check that a pattern asks for somebody's class and reads its attributes alone."""
+        """Check that a pattern asks for a class and reads its plain attributes alone."""
         cls = self.visit(pattern.cls).known
+        if isinstance(cls, type) and issubclass(cls, CONTAINERS) and not pattern.kwd_attrs:
+            return  # numbers, texts, lists
         plain = isinstance(cls, type) and library(cls) is None and type(cls) in (type, abc.ABCMeta)
         names = (*pattern.kwd_attrs, *getattr(cls, "__match_args__", ())) if plain else ()
         if not plain or any(isinstance(getattr(cls, name, None), property) for name in names):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from enum import EnumType
+from enum import EnumType, Flag
 from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -175,7 +175,7 @@ SLICE = KnownValue(True, True, known=slice(None))
 
 def captured(thing: object) -> KnownValue:
     """Return what is known of an object that was there before the call."""
-    if isinstance(thing, PLAIN):
+    if isinstance(thing, (*PLAIN, Flag)):
         return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
         return KnownValue(False, thing.ndim <= 1, known=thing)
@@ -275,7 +275,9 @@ def library(thing: object) -> str | None:
         module = owner.__name__
     elif isinstance(thing, np.ufunc):
         module = "numpy"
-    elif owner is not None and not isinstance(owner, type):
+    elif isinstance(owner, type):
+        module = module or owner.__module__  # `chain.from_iterable`, `dict.fromkeys`
+    elif owner is not None:
         return None  # a method of some object
     return module if module.partition(".")[0] in _LIBRARIES else None
 

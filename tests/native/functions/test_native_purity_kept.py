@@ -1,6 +1,9 @@
 """What outlives a call is nobody's to change: results of caches, what is handed on, classes."""
 
+import collections
+import copy
 import functools
+import itertools
 
 import control as ct
 import numpy as np
@@ -10,6 +13,8 @@ import nlctl
 from nlctl.errors import CompileError
 
 COUNT = [0]
+ROWS = [np.zeros(2), np.zeros(2)]
+SETTINGS = {"k": 1.0}
 GAIN = 2.0
 TALKS = False
 
@@ -215,3 +220,42 @@ def quotient_of_what_may_be_numpys(t, x, u, p):
 ])  # fmt: skip
 def test_what_is_not_known_is_called_as_it_stands(update):
     assert nlctl.compile(block(update)).equations.calls
+
+
+def chained_rows(t, x, u, p):
+    for row in itertools.chain(ROWS):
+        row[0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def rows_of_several(t, x, u, p):
+    for rows in itertools.chain.from_iterable([ROWS]):
+        rows[0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def pairs_of_rows(t, x, u, p):
+    for one, _ in itertools.product(ROWS, ROWS):
+        one[0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def row_of_a_copy(t, x, u, p):
+    rows = copy.copy(ROWS)
+    rows[0][0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def settings_behind_a_chain(t, x, u, p):
+    known = collections.ChainMap(SETTINGS, {"c": 1.0})
+    known["k"] = known["k"] + 1.0
+    return -x * SETTINGS["k"]
+
+
+@pytest.mark.parametrize("update", [
+    chained_rows, rows_of_several, pairs_of_rows, row_of_a_copy, settings_behind_a_chain,
+])  # fmt: skip
+def test_what_is_handed_on_is_still_somebody_elses(update):
+    """They remember how often they were called, in what they did not make."""
+    with pytest.raises(CompileError, match=r"did not make|changes an element"):
+        nlctl.compile(block(update))

@@ -31,21 +31,6 @@ def friction_in_itself(t, x, u, params):
     return [u[0] - force + 0.0 * count]
 
 
-def halved(f, low, high):
-    while high - low > 1e-6:
-        middle = 0.5 * (low + high)
-        if f(middle) > 0:
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
-
-
-@engineered(1)
-def level_by_halving(t, x, u, params):
-    return [-halved(lambda h: h**3 + h - abs(x[0]), 0.0, 8.0)]
-
-
 def friction_factor(reynolds, roughness=1e-4):
     if reynolds < 2300:
         return 64 / max(reynolds, 1.0)

@@ -1,0 +1,98 @@
+"""What comes out of what goes through containers: `zip`, `enumerate`, all of itertools."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from dataclasses import replace
+from types import FunctionType
+from typing import Any
+
+from .values import (
+    FRESH,
+    UNKNOWN_VALUE,
+    VECTOR,
+    Bound,
+    Cached,
+    Instance,
+    KnownValue,
+    ListOf,
+    Local,
+    OneOf,
+    Pure,
+    RowOf,
+    element,
+    forgotten,
+    holder,
+)
+
+# of itertools, what yields rows of what it is given; where it is of one thing in each place
+_OF_ROWS = ("product", "permutations", "combinations", "combinations_with_replacement",
+            "zip_longest", "pairwise", "batched", "tee", "groupby")  # fmt: skip
+_ZIPPED = ("product", "zip_longest")
+
+
+def _functions_in(given: Sequence[KnownValue]) -> Any:
+    """Return the choice between the functions in what is gone through, for what calls one."""
+    parts = [element(v) for v in given]
+    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
+    functions = [v for v in parts if isinstance(v.known, kinds)]
+    functions = [
+        v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
+    ]
+    return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
+
+
+def rows_of_functions(thing: object, given: Sequence[KnownValue]) -> Any:
+    """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
+    kept = _functions_in(given)
+    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
+        return kept
+    parts = tuple(map(element, given))
+    parts = parts if thing is zip else (FRESH, parts[0])
+    every = all(v.own and v.inside for v in parts)
+    return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
+
+
+def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValue | None:
+    """Return what is known of what Python's functions hand on of what they are given."""
+    if (module, name) == ("copy", "copy") and places:
+        return KnownValue(True, places[0].inside, places[0].holds)
+    if (module, name) == ("builtins", "fromkeys"):
+        return holder(places[1:])
+    if (module, name) == ("builtins", "mappingproxy") and places:
+        return replace(forgotten(places[0]), holds=True)
+    if name == "getitem" and module in ("operator", "_operator"):
+        return element(places[0])
+    if name in ("nlargest", "nsmallest", "merge") and module in ("heapq", "_heapq"):
+        return holder(map(element, places))
+    if module != "itertools" or name == "count":
+        return None
+    parts = list(places[:1]) if name == "repeat" else list(map(element, places))
+    if name == "from_iterable":
+        parts = list(map(element, parts))
+    held = holder([holder(parts)] if name in _OF_ROWS else parts)
+    return replace(held, known=rows_of_functions(zip, places)) if name in _ZIPPED else held
+
+
+def views_of(values: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of a list of views of arrays, each of which is whose the array is."""
+    if all(v.own for v in values):
+        return KnownValue(True, all(v.inside for v in values), True)
+    if all(v.inside for v in values):
+        return KnownValue(True, False, True, known=ListOf((VECTOR,)))
+    return KnownValue(True, False, True)
+
+
+def holds_others(value: KnownValue) -> bool:
+    """Whether a value is a list or dict that holds what the call has not made."""
+    is_container = isinstance(value.known, list | tuple | dict) or (value.own and value.holds)
+    return is_container and not value.inside
+
+
+def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of the result of an operator of numbers, arrays and containers."""
+    if kind in (ast.Add, ast.Mult, ast.BitOr) and any(map(holds_others, values)):
+        return KnownValue(True, False, True)  # a list or dict of what is in both
+    of_library = any(isinstance(v.known, Pure) for v in values)
+    return KnownValue(True, True, known=Pure()) if of_library else FRESH
