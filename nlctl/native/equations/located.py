@@ -224,7 +224,7 @@ def _sharp(
     for i, node in enumerate(reader.blocks):
         if node.sampled or _is_of_nlctl(node):
             continue
-        given = set(_pieces([reader.wired(node.inputs)]))
+        given = _given(reader, i, node)
         parts = needed([*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])], given)
         nodes |= dict.fromkeys(part for part in parts if part in moving)
     arguments, rows = [], 0
@@ -260,13 +260,18 @@ def _undeclared(
     for i, node in enumerate(reader.blocks):
         if node.sampled or _declares(node):
             continue
-        given = set(_pieces([reader.wired(node.inputs)]))
+        given = _given(reader, i, node)
         parts = [*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])]
         for condition in conditions(parts, given, reader.graph.of_passes):
             yield condition, node
     # What signals are, and memories become, is of blocks.
     for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):
         yield condition, None
+
+
+def _given(reader: Reader, i: int, node: Node) -> set[Expr]:
+    """Return what a block is given by others: in a loop of its own it is given its outputs."""
+    return set(_pieces([reader.wired(node.inputs)])) - set(_pieces([reader.signals[i]]))
 
 
 def _remembers(function: Expr, node: Node | None) -> bool:
