@@ -21,7 +21,7 @@ LEADS = 8.0  # what a step may lead through: e^-8 of a pulse is seen
 UNEXAMINED = 2.0  # what an argument moves by in a step that is not examined
 SHORTER = 0.3  # part to be tried of a step that is too long
 ITSELF, AREA, WAVE = 0, -1, -2  # kinds; others are exponents
-_ORDERS, _APART = (8, 128, 2048, 32768), 4  # of what exponents of parameters are near
+_ORDERS, _APART = (8, 128, 2048, 32768, 524288), 4  # of what exponents of parameters are near
 _LEAST_BASE = 1e-300  # a power of 0 is one of this, for its logarithm
 _HIGH = 6  # powers from which on a function is as good as 0 around the root of what it is of
 # what functions are measured by, in arguments; erf(6) is 1
@@ -89,11 +89,9 @@ def _open_power(graph: Graph, node: Expr) -> Iterator[SharpArgument]:
         moves = graph.op("mul", exponent, graph.op("log", some))
         yield SharpArgument(moves, ITSELF)
     elif _is_gentle(base):
-        flat_from = (
-            0.0 if base.sign == POSITIVE else -math.inf
-        )  # exponents below, see `_flat_power`
-        is_sharp = graph.op("lt", exponent, graph.const(flat_from))
-        is_sharp = graph.op("or", is_sharp, graph.op("ge", size, graph.const(float(_HIGH))))
+        is_sharp = graph.op("ge", size, graph.const(float(_HIGH)))
+        if _has_no_root(base):
+            is_sharp = graph.op("or", is_sharp, graph.op("lt", exponent, graph.const(0.0)))
         for order in _ORDERS:
             is_near = graph.op("lt", size, graph.const(order * _APART))
             if order > _ORDERS[0]:
@@ -119,7 +117,7 @@ def _flat_power(node: Expr) -> tuple[Expr, int, bool]:
 
 
 def _has_no_root(divisor: Expr) -> bool:
-    """Whether what is divided by is not 0, with parameters that are not."""
+    """Whether what is divided by is never 0, with parameters that are not."""
     if divisor.sign == POSITIVE or divisor.op != "add":
         return divisor.sign == POSITIVE
     terms = [divisor]

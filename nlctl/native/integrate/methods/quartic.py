@@ -90,7 +90,7 @@ def deepest_value(n, at, enough):
         y = polynomial_at(n, at, middle)
         below, above = polynomial_at(n, at, low), polynomial_at(n, at, high)
         if y <= min(below, above) and 2.0 * y - max(below, above) < enough:
-            middle = _narrowed(n, at, low, high)
+            middle = _by_sections(n, at, low, high)
             y = min(y, polynomial_at(n, at, middle))
         if y < least:
             least, where = y, middle
@@ -98,7 +98,7 @@ def deepest_value(n, at, enough):
 
 
 @numba.njit(**INNER)
-def _narrowed(n, at, low, high):
+def _by_sections(n, at, low, high):
     """Return where a polynomial is least between two places, by golden sections."""
     for _ in range(_SECTIONS):
         left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
