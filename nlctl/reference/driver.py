@@ -131,6 +131,32 @@ class Driver:
         if not self._leaves(solver):
             solver = self.method(self._rates, self._begun, self._held, stop, **limits)
         while True:
+            solver, limits, state, event = self._right_step(solver, stop, limits, seen)
+            if event:
+                self._note(event, seen, state)
+            until = event.time if event else float(solver.t)
+            closes = event is not None or until >= stop
+            self._watch(until, state(until))
+            self._record_within(until, state, closes)
+            pieces.append((float(solver.t_old), state))
+            x = self._held = self.jumps.committed(min(until, self._last), state(until))
+            if event:
+                seen = self.jumps.look(event.before, state(event.before))
+            elif self.jumps.any:
+                seen = self.jumps.look(min(until, self._last), x)
+            if sides.size:
+                sides = seen[: sides.size] >= 0.0
+                self.jumps.check_resolved(until, seen)
+            if closes:
+                own = self.jumps.switching
+                self._came[own] = 0.0 if event else np.sign(seen[own])
+                return until, x, sides, pieces, event
+            if solver.status == "finished":
+                solver = self.method(self._rates, until, x, stop, **limits)
+
+    def _right_step(self, solver: Any, stop: float, limits: Any, seen: np.ndarray) -> Any:
+        """Make the next step, again until it is right; return the event in it as well."""
+        while True:
             message = solver.step()
             if message is not None or self._is_stuck(solver):
                 solver = self._begun_again(solver, stop, limits, message)
@@ -153,27 +179,7 @@ class Driver:
             if event and not self._is_solution(float(solver.t_old), event.before, state):
                 solver = self.method(self._rates, solver.t_old, self._held, event.before, **limits)
                 continue
-            if event:
-                self._note(event, seen, state)
-            until = event.time if event else float(solver.t)
-            closes = event is not None or until >= stop
-            self._watch(until, state(until))
-            self._record_within(until, state, closes)
-            pieces.append((float(solver.t_old), state))
-            x = self._held = self.jumps.committed(min(until, self._last), state(until))
-            if event:
-                seen = self.jumps.look(event.before, state(event.before))
-            elif self.jumps.any:
-                seen = self.jumps.look(min(until, self._last), x)
-            if sides.size:
-                sides = seen[: sides.size] >= 0.0
-                self.jumps.check_resolved(until, seen)
-            if closes:
-                own = self.jumps.switching
-                self._came[own] = 0.0 if event else np.sign(seen[own])
-                return until, x, sides, pieces, event
-            if solver.status == "finished":
-                solver = self.method(self._rates, until, x, stop, **limits)
+            return solver, limits, state, event
 
     def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
         """Whether a step's polynomial solves the equations up to an event in it, or its end."""
@@ -209,11 +215,8 @@ class Driver:
         return Across(t, self._held, self._rates(t, self._held), end)
 
     def _leaves(self, over: Across | None) -> bool:
-        """Whether a step by rounding leaves an equal place, to a side that no step has come from.
-
-        On the other one rates may lead away as well, and what an integrator subtracts again of a
-        step that it has refused may lie there.
-        """
+        """Whether a step by rounding leaves an equal place, to where no step has come from."""
+        # On the other one, where an integrator may go back to, rates may lead away as well.
         if over is None or not (waits := self._came == 0.0).any():
             return False
         waits[self.jumps.switching] = False
