@@ -81,7 +81,7 @@ def _waves(graph: Graph, arguments: Iterable[Expr]) -> dict[SharpArgument, None]
 
 
 def _open_power(graph: Graph, node: Expr) -> Iterator[SharpArgument]:
-    """Yield by what a power is measured whose exponent is no constant."""
+    """Yield by what a power is measured whose exponent is a parameter, or varies."""
     base, exponent = map(graph.number, node.args)
     size, one = graph.op("absolute", exponent), graph.const(1.0)
     if exponent.varies or not base.varies:
@@ -123,7 +123,7 @@ def _has_no_root(divisor: Expr) -> bool:
     terms = [divisor]
     while sums := [term for term in terms if term.op == "add"]:
         terms = [term for term in terms if term.op != "add"]
-        terms += [arg for each in sums for arg in each.args]
+        terms += [arg for total in sums for arg in total.args]
     return all(term.sign >= NEVER_NEGATIVE or not term.varies for term in terms)
 
 
