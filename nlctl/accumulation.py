@@ -32,6 +32,7 @@ SECOND_ORDER = (
     "an nlctl.IdealRelay with a larger rest_rate, or let the run end before"
 )
 _LOCATED = 50.0  # relative tolerances by which periods fall at least; switches are located to 10
+_SUDDEN = 0.02  # of the ratio of two periods: the next one, in a sequence
 _FALLS = 0.2  # part by which it is enough that they fall, whatever the tolerance is
 _FINITE = 0.9  # of two periods: those that fall as 1 / n do not fall so much for long
 
@@ -83,7 +84,8 @@ def crowd_of(times: np.ndarray, row: int, end: float, rtol: float, most: float) 
     enough = min(_FALLS, _LOCATED * rtol)
     if not (np.all(periods[2:] < periods[:-2]) and periods[-1] < (1 - enough) * periods[0]):
         return None
-    if not periods[-1] > 0.0:
+    # Where places lie close together by chance, the last one falls by far more than those before.
+    if not periods[-1] * periods[-3] > _SUDDEN * periods[-2] ** 2:
         return None
     fall = np.log(periods[0] / periods[-1])
     pace = fall / (times[-1] - times[-1 - periods.size])

@@ -37,7 +37,8 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
         return False
     with np.errstate(invalid="ignore"):  # what is infinite on both sides is not known to agree
         return all(
-            np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in zip(*sides, strict=True)
+            np.all(abs(np.subtract(a, b, dtype=float)) <= _SAME * (1 + abs(a) + abs(b)))
+            for a, b in zip(*sides, strict=True)  # truth values as well, of guards
         )
 
 

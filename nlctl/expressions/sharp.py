@@ -9,11 +9,11 @@ it moves by 1 the function moves by a factor e at most, and farther than `RANGE`
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from .graph import Expr, Graph, deduce, needed
-from .signs import POSITIVE
+from .signs import NEVER_NEGATIVE, POSITIVE
 
 RANGE = 36.0  # e^-36 is less than rounding
 # of the integrators of both engines, in this measure and in parts of a step
@@ -21,6 +21,8 @@ LEADS = 8.0  # what a step may lead through: e^-8 of a pulse is seen
 UNEXAMINED = 2.0  # what an argument moves by in a step that is not examined
 SHORTER = 0.3  # part to be tried of a step that is too long
 ITSELF, AREA, WAVE = 0, -1, -2  # kinds; others are exponents
+_ORDERS, _APART = (8, 128, 2048, 32768, 524288), 4  # of what exponents of parameters are near
+_LEAST_BASE = 1e-300  # a power of 0 is one of this, for its logarithm
 _HIGH = 6  # powers from which on a function is as good as 0 around the root of what it is of
 # what functions are measured by, in arguments; erf(6) is 1
 _FACTORS = {
@@ -57,10 +59,11 @@ def sharp_arguments(graph: Graph, nodes: Iterable[Expr]) -> tuple[SharpArgument,
             arguments[SharpArgument(difference, ITSELF)] = None
         elif node.op == "arctan":
             arguments[SharpArgument(graph.number(node.args[0]), AREA)] = None
+        elif node.op == "power" and node.args[1].op != "const":
+            arguments |= dict.fromkeys(_open_power(graph, node))
         else:
-            divides = node.op == "div" and node.args[1].sign == POSITIVE
-            base, exponent = as_power(node.args[1] if divides else node)
-            if base.varies and (divides or exponent >= _HIGH) and _is_gentle(base):
+            base, exponent, is_sharp = _flat_power(node)
+            if is_sharp and base.varies and _is_gentle(base):
                 powers[base] = max(powers.get(base, 0), exponent)
     known = (SharpArgument(graph.number(base), exponent) for base, exponent in powers.items())
     measured = (*arguments, *known)
@@ -75,6 +78,53 @@ def _waves(graph: Graph, arguments: Iterable[Expr]) -> dict[SharpArgument, None]
         for node in needed(arguments)
         if node.op in ("sin", "cos", "tan") and node.varies
     }
+
+
+def _open_power(graph: Graph, node: Expr) -> Iterator[SharpArgument]:
+    """Yield by what a power is measured whose exponent is a parameter, or varies."""
+    base, exponent = map(graph.number, node.args)
+    size, one = graph.op("absolute", exponent), graph.const(1.0)
+    if exponent.varies or not base.varies:
+        some = graph.op("maximum", graph.op("absolute", base), graph.const(_LEAST_BASE))
+        moves = graph.op("mul", exponent, graph.op("log", some))
+        yield SharpArgument(moves, ITSELF)
+    elif _is_gentle(base):
+        is_sharp = graph.op("ge", size, graph.const(float(_HIGH)))
+        if _has_no_root(base):
+            is_sharp = graph.op("or", is_sharp, graph.op("lt", exponent, graph.const(0.0)))
+        for order in _ORDERS:
+            is_near = graph.op("lt", size, graph.const(order * _APART))
+            if order > _ORDERS[0]:
+                above = graph.op("ge", size, graph.const(order / _APART))
+                is_near = graph.op("and", is_near, above)
+            chosen = graph.op("select", graph.op("and", is_sharp, is_near), base, one)
+            yield SharpArgument(chosen, order)
+
+
+def _flat_power(node: Expr) -> tuple[Expr, int, bool]:
+    """Return of what a node is which power, and whether it is flat far from 0, or next to it."""
+    if node.op == "div" and node.args[1].varies:
+        base, exponent = as_power(node.args[1])
+        while base.op == "sqrt" and base.sign != POSITIVE:
+            base = base.args[0]
+        return base, exponent, _has_no_root(base)
+    if node.op == "power":
+        base, exponent = node.args[0], float(node.args[1].data)
+        divides = exponent < 0.0 and _has_no_root(base)
+        return base, math.ceil(abs(exponent)), divides or abs(exponent) >= _HIGH
+    base, exponent = as_power(node)
+    return base, exponent, exponent >= _HIGH
+
+
+def _has_no_root(divisor: Expr) -> bool:
+    """Whether what is divided by is never 0, with parameters that are not."""
+    if divisor.sign == POSITIVE or divisor.op != "add":
+        return divisor.sign == POSITIVE
+    terms = [divisor]
+    while sums := [term for term in terms if term.op == "add"]:
+        terms = [term for term in terms if term.op != "add"]
+        terms += [arg for total in sums for arg in total.args]
+    return all(term.sign >= NEVER_NEGATIVE or not term.varies for term in terms)
 
 
 def _is_gentle(base: Expr) -> bool:

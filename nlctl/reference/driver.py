@@ -22,6 +22,8 @@ from .jumps import Jumps
 from .looks import FEW_PLACES, STEP_PLACES
 from .past import Past
 from .rough import MOST_STEPS, ROUGH, next_to, rough_state
+from .solved import solves
+from .still import Across, Still
 from .stops import TIME_ROUNDING, Stops
 from .switches import Switches
 
@@ -32,32 +34,12 @@ _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
 _FIRST = 1e-9  # of a run: the first step of an explicit method where another one has failed
 _ROUNDED, _ULPS = 1.0 + 1e-9, 4.0  # times a step, and of its time: what is as long
+_ACROSS = 1e-13  # of a run, and of its time: what is crossed by rounding
 _SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
 _STUCK, _SAMES = 1e-5, 40  # part of a run: shorter steps, so many of which are alike
 _LOOKED_AT = 2000  # steps, after each of which it is asked whether rates are noise
-_GAUSS, _SOLVES = np.polynomial.legendre.leggauss(5), 10.0  # tolerances by which a step solves
 _MOST_OF, _PARTED = 0.5, 0.1  # of a flow: a step that is looked at; of that: what follows if wrong
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
-
-
-class Still:
-    """What stands for an integrator where there are no states: it goes from place to place."""
-
-    status = "running"
-
-    def __init__(
-        self, rates: object, t: float, y: np.ndarray, end: float, max_step: float, **_: object
-    ) -> None:
-        self.t, self.t_old, self.y, self._end, self._step = t, t, y, end, max_step
-
-    def step(self) -> None:
-        """Go to the next place."""
-        self.t_old, self.t = self.t, min(self.t + self._step, self._end)
-        self.status = "finished" if self.t >= self._end else "running"
-
-    def dense_output(self) -> Callable[[float], np.ndarray]:
-        """Return the solution, which has no entries."""
-        return lambda t: self.y
 
 
 def diverged(system: System, time: float) -> DivergedError:
@@ -145,23 +127,11 @@ class Driver:
     def _integrated(self, stop: float, sides: np.ndarray, seen: np.ndarray) -> Any:
         """Integrate from where a flow has begun, step by step, each of which is right."""
         limits, pieces = self._bounded(self._begun, stop), []
-        solver = self.method(self._rates, self._begun, self._held, stop, **limits)
+        solver: Any = self._rounded(self._begun, stop)
+        if not self._leaves(solver):
+            solver = self.method(self._rates, self._begun, self._held, stop, **limits)
         while True:
-            message = solver.step()
-            if message is not None or self._is_stuck(solver):
-                solver = self._begun_again(solver, stop, limits, message)
-                continue
-            state = self._solution(solver)
-            if allowed := self._allowed(solver, state, limits["max_step"], stop):
-                limits = limits | {"max_step": allowed}
-                short = self._shortened(solver, stop, limits)
-                solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
-                continue
-            self._note_left(float(solver.t_old), float(solver.t), state)
-            event = self._event(solver, state, seen)
-            if event and not self._is_solution(float(solver.t_old), event.before, state):
-                solver = self.method(self._rates, solver.t_old, self._held, event.before, **limits)
-                continue
+            solver, limits, state, event = self._right_step(solver, stop, limits, seen)
             if event:
                 self._note(event, seen, state)
             until = event.time if event else float(solver.t)
@@ -184,25 +154,41 @@ class Driver:
             if solver.status == "finished":
                 solver = self.method(self._rates, until, x, stop, **limits)
 
-    def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
-        """Whether a step's polynomial solves the equations up to an event in it, or its end.
+    def _right_step(self, solver: Any, stop: float, limits: Any, seen: np.ndarray) -> Any:
+        """Make the next step, again until it is right; return the event in it as well."""
+        while True:
+            message = solver.step()
+            if message is not None or self._is_stuck(solver):
+                solver = self._begun_again(solver, stop, limits, message)
+                continue
+            if solver.t == solver.t_old:  # rates may jump by too much for any step that meets that
+                over = self._rounded(float(solver.t), stop)
+                solver = over if over and self._event(over, self._solution(over), seen) else solver
+            state, event = self._solution(solver), None
+            allowed = self._allowed(solver, state, limits["max_step"], stop)
+            if not allowed:
+                event = self._event(solver, state, seen)
+                # What is measured may have a kink there: it is smooth up to that.
+                allowed = self._led(solver.t_old, event.before, state) if event else 0.0
+            if allowed:
+                limits = limits | {"max_step": allowed}
+                short = self._shortened(solver, stop, limits)
+                solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
+                continue
+            self._note_left(float(solver.t_old), float(solver.t), state)
+            if event and not self._is_solution(float(solver.t_old), event.before, state):
+                solver = self.method(self._rates, solver.t_old, self._held, event.before, **limits)
+                continue
+            return solver, limits, state, event
 
-        It has been made of right-hand sides behind the event as well, and by a multistep method of
-        none within.  What rates do where the state moves by the tolerance says nothing.
-        """
-        length = end - begin
-        if not length > _SHORTEST * self._span:
+    def _is_solution(self, begin: float, end: float, state: Callable[..., Any]) -> bool:
+        """Whether a step's polynomial solves the equations up to an event in it, or its end."""
+        if not end - begin > _SHORTEST * self._span:
             return True
-        times = begin + 0.5 * length * (1.0 + _GAUSS[0])
-        slopes = [self._rates(t, state(t)) for t in times.tolist()]
-        left = state(end) - self._held - 0.5 * length * (_GAUSS[1] @ slopes)
-        left[self.jumps.still] = 0.0
-        allowed = self.settings["atol"] + self.settings["rtol"] * np.abs(state(end))
-        if not np.any(np.abs(left) > _SOLVES * allowed):
-            return True
-        k = len(slopes) // 2
-        noise = np.abs(self._rates(times[k], state(times[k]) + allowed) - slopes[k])
-        return not np.any(np.abs(left) > _SOLVES * (allowed + length * noise))
+        moves = np.ones(self._held.size, dtype=bool)
+        moves[self.jumps.still] = False
+        tolerances = self.settings["rtol"], self.settings["atol"]
+        return solves(self._rates, (begin, self._held), (end, state), moves, tolerances)
 
     def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str | None) -> Any:
         """Return an integrator that begins where one has failed, explicit where that fails too.
@@ -220,6 +206,21 @@ class Driver:
         own = {name: bounded[name] for name in ("rtol", "atol", "max_step")}
         first = min(_FIRST * self._span, own["max_step"], stop - t)
         return RK45(self._rates, t, self._held, stop, first_step=first, **own)
+
+    def _rounded(self, t: float, stop: float) -> Across | None:
+        """Return a step over what is within rounding of a time, None where a stop is so near."""
+        end = t + _ACROSS * max(abs(t), self._span)
+        if not self.jumps.any or not end < stop:
+            return None
+        return Across(t, self._held, self._rates(t, self._held), end)
+
+    def _leaves(self, over: Across | None) -> bool:
+        """Whether a step by rounding leaves an equal place, to where no step has come from."""
+        # On the other one, where an integrator may go back to, rates may lead away as well.
+        if over is None or not (waits := self._came == 0.0).any():
+            return False
+        waits[self.jumps.switching] = False
+        return bool(np.any(waits & (self._signs(self._looked(over.t, over.y)) != 0.0)))
 
     def _is_stuck(self, solver: Any) -> bool:
         """Whether an integrator takes the same short step over and over again.
@@ -267,10 +268,8 @@ class Driver:
             return longest
         if may_grow and length > 0.5 * bound:
             return longest
-        part = self.jumps.followed(solver.t_old + STEP_PLACES.at * length, state)
-        if part < 1.0 and part * length > _SHORTEST * self._span:
-            self._narrow = float(solver.t_old)
-            return part * length
+        if led := self._led(solver.t_old, solver.t, state):
+            return led
         if self._slept(solver, state):
             return self._span / _PLACES
         # One that is most of the way from stop to stop has been seen at its ends alone.
@@ -280,6 +279,17 @@ class Driver:
             self._narrow = float(solver.t_old)
             return _PARTED * length
         return 0.0
+
+    def _led(self, begin: float, end: float, state: Callable[..., Any]) -> float:
+        """Return how long a step should have been by what it leads through, 0 if it is right."""
+        length, shortest = float(end - begin), _SHORTEST * self._span
+        if not length > shortest:
+            return 0.0
+        part = self.jumps.followed(begin + STEP_PLACES.at * length, state)
+        if part == 1.0 or not part * length > shortest:
+            return 0.0
+        self._narrow = float(begin)
+        return part * length
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
@@ -374,7 +384,8 @@ class Driver:
         waits[self.jumps.switching] = False
         if not waits.any():
             return
-        s = t + STEP_PLACES.at[1] * (until - t)
+        rounded = _ACROSS * max(abs(t), self._span)
+        s = min(t + max(STEP_PLACES.at[1] * (until - t), rounded), until)
         sides, x = self._signs(self._looked(s, state(s))), state(t)
         for i in np.flatnonzero(waits & (sides != 0.0)).tolist():
             self._note_first(i, t, bool(sides[i] > 0.0), x)

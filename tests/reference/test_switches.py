@@ -111,3 +111,16 @@ def test_an_ideal_relay_is_refused_by_name_where_python_control_is_asked_for():
         nlctl.input_output_response(loop, [0, 5.0], 0, {"plant.x[0]": 1}, engine="python-control")
     made = nlctl.input_output_response(loop, [0, 5.0], 0, {"plant.x[0]": 1})
     assert abs(float(np.ravel(made.outputs)[-1])) < 1e-6
+
+
+def test_places_that_lie_close_together_do_not_accumulate():
+    """argmin over |x - X_k| switches halfway between neighbours, the last of which are close."""
+    values, places = np.array([0.0, 0.0, 5e3, 0.0, 0.0]), np.array([0.0, 1.0, 1.0002, 3.0, 4.0])
+    nearest = ct.nlsys(
+        lambda t, x, u, p: [1.0, values[np.argmin(np.abs(places - x[0]))]],
+        lambda t, x, u, p: x[1], inputs=0, outputs=1, states=2, name="nearest",
+    )  # fmt: skip
+    run = nlctl.input_output_response(
+        nearest, [0, 3.5], 0, [0, 0], engine="python-control", rtol=1e-6, atol=1e-8
+    )
+    assert run.states[1, -1] == pytest.approx(5e3 * (2.0001 - 1.0001), rel=1e-6)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -21,7 +20,6 @@ from ..equations.relays import relay_places
 from ..happened import row_labels
 from .steps import Jump
 
-_ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 _WIDER = (0.0, *(4.0**k for k in range(14)))  # in distances between neighbouring states
 _JUMPS = 1e3  # change of an output over that of inputs and states, which no usual function has
 _ROUNDING = 1e-9  # of a value: what is not a jump
@@ -93,7 +91,7 @@ def _changed(
     compiled: Compiled, p: np.ndarray, params: Mapping[str, Any] | None, jump: Jump
 ) -> str:
     """Return the block whose values change most for what changes at its inputs and states."""
-    with _ONE_AT_A_TIME, np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # of a copy of the diagram, which nobody else evaluates
         system = overridden(compiled.schedule.system, params)
         for wider in _WIDER:  # it rounds otherwise than machine code
             before, after = (list(_blocks(compiled, system, p, side)) for side in jump.sides(wider))

@@ -10,8 +10,13 @@ import numpy as np
 
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
-from ...expressions.bends import only_bends
-from ...expressions.conditions import at_integers, conditions, sign_factors, switching_functions
+from ...expressions.bends import only_bends, replaced_parts
+from ...expressions.conditions import (
+    at_integers,
+    conditions,
+    sign_factors,
+    switching_functions,
+)
 from ...expressions.dependence import affine, reads
 from ...expressions.derivatives import tangents
 from ...expressions.edges import have_edges
@@ -26,6 +31,7 @@ if TYPE_CHECKING:
 
 _MOST = 256  # switching functions of one diagram; more cost more than they are worth
 _MOST_FREQUENCIES = 64  # in a product: of more it is a train of pulses rather than a wave
+_SIZES = 3  # in a comparison of t alone: absolute values, each of which has two signs
 _BENDS = ("absolute", "minimum", "maximum")
 _STEEP = ("sqrt", "power", "cbrt", "hypot")  # a rate that has no derivative where it is 0
 
@@ -58,7 +64,8 @@ class Conditions:
 
     # first those that only bend, then those at which something may jump
     located: tuple[Located, ...] = ()
-    of_time: tuple[Expr, ...] = ()  # conditions of t alone, which are solved before a run
+    # conditions of t alone, which are solved before a run, and with what each switches
+    of_time: Mapping[Expr, Sequence[Expr]] = field(default_factory=dict)
     # switching functions that blocks declare and that are straight lines of t, by their rows:
     # faults' beginnings and ends
     declared_of_time: Mapping[int, Expr] = field(default_factory=dict)
@@ -130,7 +137,7 @@ def found_conditions(
     timed, inside = _of_time(nodes), set(nodes)
     known = {_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
-    of_time: dict[Expr, None] = {}
+    of_time: dict[Expr, tuple[Expr, ...]] = {}
     rows, count, beyond = 0, 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
     only_shown = set(needed(list(shown))) - inside
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
@@ -139,7 +146,7 @@ def found_conditions(
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
     for condition, node in _undeclared(reader, rates, falls, others, watched):
         if condition in timed and condition in inside:
-            of_time[condition] = None
+            of_time[condition] = _factors_of_time(reader.graph, condition)
         if condition in timed or condition not in inside:
             count += condition in only_shown
             continue
@@ -154,7 +161,7 @@ def found_conditions(
     waves, pulses = _moving(reader.graph, terms, timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
-        located=ordered, of_time=tuple(of_time),
+        located=ordered, of_time=of_time,
         declared_of_time=_declared_of_time(reader.graph, declared, timed), waves=waves,
         pulses=pulses, beyond=beyond, shown=count,
         sharp=_sharp(reader, rates, falls, watched, inside - timed),
@@ -167,6 +174,22 @@ def _is_steep(node: Expr) -> bool:
         base, exponent = node.args  # 10^z is smooth, and z^1.5 has a derivative
         return base.op != "const" and exponent.data < 1.0
     return node.op in _STEEP and node.varies
+
+
+def _factors_of_time(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
+    """Return with what a comparison of t alone switches, if that says more than a difference."""
+    if condition.op not in ORDERS or condition.size is not None:
+        return ()
+    difference = graph.op("sub", *map(graph.number, condition.args))
+    functions = [difference]
+    for _ in range(_SIZES):  # |z| - r is z - r or -z - r
+        for size in [n for n in needed(functions) if n.op == "absolute" and n.varies][:1]:
+            sides = size.args[0], graph.op("neg", size.args[0])
+            instead = (replaced_parts(graph, functions, {size: side}) for side in sides)
+            functions = [function for every in instead for function in every]
+    functions += switching_functions(graph, condition)
+    factors = [factor for function in functions for factor in sign_factors(graph, function)]
+    return tuple(factor for factor in dict.fromkeys(factors) if factor is not difference)
 
 
 def _with_levels(graph: Graph, function: Expr) -> Expr:
@@ -232,7 +255,7 @@ def _sharp(
     for i, node in enumerate(reader.blocks):
         if node.sampled or _is_of_nlctl(node):
             continue
-        given = set(_pieces([reader.wired(node.inputs)]))
+        given = _given(reader, i, node)
         parts = needed([*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])], given)
         nodes |= dict.fromkeys(part for part in parts if part in moving)
     arguments, rows = [], 0
@@ -268,13 +291,18 @@ def _undeclared(
     for i, node in enumerate(reader.blocks):
         if node.sampled or _declares(node):
             continue
-        given = set(_pieces([reader.wired(node.inputs)]))
+        given = _given(reader, i, node)
         parts = [*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])]
         for condition in conditions(parts, given, reader.graph.of_passes):
             yield condition, node
     # What signals are, and memories become, is of blocks.
     for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):
         yield condition, None
+
+
+def _given(reader: Reader, i: int, node: Node) -> set[Expr]:
+    """Return what a block is given by others: in a loop of its own it is given its outputs."""
+    return set(_pieces([reader.wired(node.inputs)])) - set(_pieces([reader.signals[i]]))
 
 
 def _remembers(function: Expr, node: Node | None) -> bool:

@@ -132,7 +132,10 @@ def new_work(
             Inside, (lanes,), values=(5,), newton=(5,), bracket=(3, lanes), height=(3, lanes)
         ),
         sharp=arrays_alike(
-            SharpArrays, (sharp, lanes), at=(7, sharp, lanes), part=(lanes,), until=(lanes,)
+            SharpArrays,
+            (sharp, lanes),
+            at=(7, sharp, lanes),
+            **dict.fromkeys(("part", "until", "lasted"), (lanes,)),
         ),
         stiff=new_stiff(n if lanes == 1 else 0, inputs),  # that method is for single runs
         taylor=new_terms(*terms, inputs, lanes),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -18,6 +18,7 @@ _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 
+_SAME = 1e-12  # of the times: places that are one
 _ROUNDINGS = 8  # ways of rounding in which a condition must agree on either side of its switch
 _WIDER = 4.0
 
@@ -27,11 +28,15 @@ Indicator = Callable[[np.ndarray], np.ndarray]
 
 
 def break_points(
-    conditions: Sequence[Expr], p: np.ndarray, span: tuple[float, float], fastest: float
+    conditions: Mapping[Expr, Sequence[Expr]],
+    p: np.ndarray,
+    span: tuple[float, float],
+    fastest: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return until when conditions of t alone are as they were, and when they have switched.
 
-    Within a run, with one parameter vector.  Between the two it depends on how a sine is rounded.
+    Of each, what it switches with: z - r and -r - z of z^2 < r^2, which is narrow.  Within a run,
+    with one parameter vector.  Between the two it depends on how a sine is rounded.
     """
     given = p[:, None]
 
@@ -63,6 +68,10 @@ def break_points(
             indicator: Indicator = partial(level, values)
             if crossed is None:
                 at = _sought(indicator, partial(_compared, condition, k, values), span, fastest)
+                for factor in conditions[condition]:
+                    of_factor = partial(_factor, factor, values)
+                    roots = _sought(partial(_is_below, of_factor), of_factor, span, fastest)
+                    at = _with_roots(indicator, at, roots, span)
             else:
                 at = _exact(indicator, crossed, span)
             at = at[(at > span[0]) & (at <= span[1])]
@@ -165,6 +174,30 @@ def _compared(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndar
             a, b = (_element(k, t, array) for array in values(list(args), t))
             return a * 1.0 - b * 1.0
     return np.ones(t.size)
+
+
+def _factor(factor: Expr, values: Values, t: np.ndarray) -> np.ndarray:
+    """Return what a condition switches with."""
+    with np.errstate(all="ignore"):
+        return _element(0, t, values([factor], t)[0])
+
+
+def _is_below(values: Indicator, t: np.ndarray) -> np.ndarray:
+    """Return the indicator of a function below 0."""
+    return (values(t) < 0.0).astype(float)
+
+
+def _with_roots(
+    indicator: Indicator, at: np.ndarray, roots: np.ndarray, span: tuple[float, float]
+) -> np.ndarray:
+    """Return where an indicator changes, also next to roots of what it is made of."""
+    if not roots.size:
+        return at
+    scale = max(map(abs, span))
+    width = min(_NEAR * scale, 0.25 * np.diff(roots).min(initial=np.inf))
+    more = _bisected(indicator, roots - width, roots + width, None)
+    apart = np.abs(more[:, None] - at).min(axis=1, initial=np.inf)
+    return np.union1d(at, more[apart > _SAME * scale])
 
 
 def _dips(t: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from ..control import shorten
 from ..evaluate import inputs_at, on_this_side
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3
 from ..methods.dense import solution_at
-from ..methods.quartic import least_value, polynomial_at, quartic
+from ..methods.quartic import deepest_value, least_value, polynomial_at, quartic
 from ..state import INNER, opposite
 from .location import AGAIN
 
@@ -34,6 +34,7 @@ _DENSE = 2  # the row of task.pair.inside that is no method's stages
 _CHECKED = (0.11, 0.61)  # parts of a step at which a polynomial is checked
 _POINTS, _HALVINGS = 32, 12
 _TINY = 1e-300
+_ROUNDED = 1e-15  # of an argument: what it is wrong by in any case
 _SHORTEST = 1e-7  # part of a run: shorter steps are taken
 
 
@@ -52,7 +53,9 @@ class SharpArrays(NamedTuple):
     part: Reals1  # of the step: where it is looked next, or how long one to try is to be
     last: Reals2  # at the end of the step before: (rows, lanes)
     pace: Reals2  # and how fast that has moved (1/s)
+    bend: Reals2  # and by how much faster or slower than in the one before (1/s^2)
     until: Reals1  # the time at which it has ended (s)
+    lasted: Reals1  # and how long it was (s)
     table: Places2
 
 
@@ -79,21 +82,38 @@ def look_at_sharp(task, lanes, w, found):
         _look_within(task, lanes, w, found)
     for j in range(lanes.size):
         if found[j] > AGAIN:
-            sharp.until[j] = lanes[j].t + lanes[j].step
-            for i in range(task.sharp.kinds.size):
-                moved = abs(sharp.at[4, i, j] - sharp.last[i, j])
-                sharp.pace[i, j], sharp.last[i, j] = moved / lanes[j].step, sharp.at[4, i, j]
+            _keep(task, lanes[j], sharp, j)
+
+
+@numba.njit(**INNER)
+def _keep(task, lane, sharp, j):
+    """Keep where arguments are at the end of a step, how fast they have moved, and how straight."""
+    apart = 0.5 * (lane.step + sharp.lasted[j]) if _continues(lane, sharp, j) else 0.0
+    for i in range(task.sharp.kinds.size):
+        before, pace = sharp.pace[i, j], (sharp.at[4, i, j] - sharp.last[i, j]) / lane.step
+        sharp.bend[i, j] = abs(pace - before) / apart if apart > 0.0 else np.inf
+        sharp.pace[i, j], sharp.last[i, j] = pace, sharp.at[4, i, j]
+    sharp.until[j], sharp.lasted[j] = lane.t + lane.step, lane.step
+
+
+@numba.njit(**INNER)
+def _continues(lane, sharp, j):
+    """Whether a step begins where the one that is kept has ended, without a jump."""
+    is_kept = sharp.lasted[j] > 0.0  # none before the first step
+    return is_kept and abs(sharp.until[j] - lane.t) <= _ROUNDING * lane.step
 
 
 @numba.njit(**INNER)
 def _is_calm(task, lane, w, j):
     """Whether arguments hardly move: from end to end, nor at the pace of the step before."""
     # What is behind a jump, or a step that was not looked at, has no such pace.
-    sharp, calm = w.sharp, abs(w.sharp.until[j] - lane.t) <= _ROUNDING * lane.step
+    # Where one turns it has none either, and how it bends says what it does next.
+    sharp, calm = w.sharp, _continues(lane, w.sharp, j)
+    both = 0.5 * (sharp.lasted[j] + lane.step)
     for i in range(task.sharp.kinds.size):
         kind, before, end = task.sharp.kinds[i], sharp.last[i, j], sharp.at[4, i, j]
         moved = abs(end - before)
-        most = max(moved, sharp.pace[i, j] * lane.step)
+        most = max(moved, (abs(sharp.pace[i, j]) + both * sharp.bend[i, j]) * lane.step)
         if kind == ITSELF:
             is_far = max(before, end) + _WITHIN * most < -RANGE
             is_far |= min(before, end) - _WITHIN * most > RANGE
@@ -203,20 +223,22 @@ def _followed(task, w, i, j):
     for n in range(2):
         missed = abs(polynomial_at(newton, at, _CHECKED[n]) - w.sharp.at[5 + n, i, j])
         wrong = missed if not missed <= wrong else wrong
-    least, lowest = least_value(newton, at, False)
-    for n in range(5):
-        newton[n] = -newton[n]
-    most, highest = least_value(newton, at, False)
-    most = -most
-    for n in range(5):
-        newton[n] = -newton[n]
-    nearest = max(least, -most, 0.0)
-    if _is_flat(kind, least - _FAR * wrong, most + _FAR * wrong):
-        return 1.0
-    if not _blurred(kind, nearest, wrong) <= _WRONG:
-        return SHORTER
-    if _led(kind, newton, at, 1.0, lowest, highest) <= LEADS:
-        return 1.0
+    wrong += _ROUNDED * max(abs(values[0]), abs(values[4]))
+    enough, closely = _edge(kind) + _FAR * wrong, False
+    while True:
+        least, lowest = _least(newton, at, enough, closely)
+        _negate(newton)
+        most, highest = _least(newton, at, enough, closely)
+        _negate(newton)
+        most = -most
+        if not _is_flat(kind, least - _FAR * wrong, most + _FAR * wrong):
+            if not _blurred(kind, max(least, -most, 0.0), wrong) <= _WRONG:
+                return SHORTER
+            if not _led(kind, newton, at, 1.0, lowest, highest) <= LEADS:
+                break
+        if closely:
+            return 1.0
+        closely = True
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
@@ -225,6 +247,26 @@ def _followed(task, w, i, j):
         else:
             high = middle
     return low
+
+
+@numba.njit(**INNER)
+def _least(newton, at, enough, closely):
+    """Return the least value of a polynomial, and where it is, first as far as a grid says."""
+    return deepest_value(newton, at, enough) if closely else least_value(newton, at, False)
+
+
+@numba.njit(**INNER)
+def _negate(newton):
+    for n in range(5):
+        newton[n] = -newton[n]
+
+
+@numba.njit(**INNER)
+def _edge(kind):
+    """Return how far from 0 an argument is from where on a function is flat."""
+    if kind == ITSELF:
+        return RANGE
+    return np.sinh(0.5 * RANGE) if kind == AREA else np.exp(RANGE / max(kind, 1))
 
 
 @numba.njit(**INNER)

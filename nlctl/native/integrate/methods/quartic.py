@@ -8,6 +8,7 @@ import numpy as np
 from ..state import INNER
 
 _POINTS = 32
+_SECTIONS, _GOLDEN = 60, 0.5 * (5.0**0.5 - 1.0)
 
 
 @numba.njit(**INNER)
@@ -76,6 +77,36 @@ def least_value(n, at, slope, inner=False):
     if bend > 0.0 and low < middle - 0.5 * tilt / bend < high:
         return y - 0.25 * tilt * tilt / bend, middle - 0.5 * tilt / bend
     return least, _node(where)
+
+
+@numba.njit(**INNER)
+def deepest_value(n, at, enough):
+    """Return the least value of a polynomial, and its place: closely where it may be below one."""
+    # The polynomial (x - a)^4 / w^4 is as good as 0 over a part of the grid that may be tiny, and
+    # no parabola through three values says so.
+    least, where = np.inf, 0.0
+    for k in range(_POINTS + 1):
+        low, middle, high = _node(max(k - 1, 0)), _node(k), _node(min(k + 1, _POINTS))
+        y = polynomial_at(n, at, middle)
+        below, above = polynomial_at(n, at, low), polynomial_at(n, at, high)
+        if y <= min(below, above) and 2.0 * y - max(below, above) < enough:
+            middle = _by_sections(n, at, low, high)
+            y = min(y, polynomial_at(n, at, middle))
+        if y < least:
+            least, where = y, middle
+    return least, where
+
+
+@numba.njit(**INNER)
+def _by_sections(n, at, low, high):
+    """Return where a polynomial is least between two places, by golden sections."""
+    for _ in range(_SECTIONS):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        if polynomial_at(n, at, left) < polynomial_at(n, at, right):
+            high = right
+        else:
+            low = left
+    return 0.5 * (low + high)
 
 
 @numba.njit(**INNER)
