@@ -275,7 +275,36 @@ def bisected(t, x, u, params):
     return [-optimize.bisect(lambda y: y + y**3 - x[0], -4.0, 4.0)]
 
 
-@pytest.mark.parametrize("update", [by_halves, halves_to_a_tolerance, bisected])
+def halves_of_a_state(t, x, u, params):
+    """The same in a bracket that follows the state: with all answers alike it moves with that."""
+    low, high = x[0] / 20, x[0]
+    for _ in range(45):
+        middle = (low + high) / 2
+        if middle + middle**3 - x[0] > 0:
+            high = middle
+        else:
+            low = middle
+    return [-middle]
+
+
+def where_signs_differ(t, x, u, params):
+    """The same, with the value at one end."""
+    a, b = 0.0, 1.0 + abs(x[0])
+    at_a = a + a**3 - x[0]
+    for _ in range(50):
+        c = a + (b - a) / 2
+        at_c = c + c**3 - x[0]
+        if at_a * at_c <= 0:
+            b = c
+        else:
+            a, at_a = c, at_c
+    return [-c]
+
+
+@pytest.mark.parametrize(
+    "update",
+    [by_halves, halves_to_a_tolerance, bisected, halves_of_a_state, where_signs_differ],
+)
 def test_a_search_by_halves_is_called_as_it_stands(update):
     """With y + y^3 = x and x' = -y: ln(y / y0) + 3 (y^2 - y0^2) / 2 = -t, dy/dx = 1/(1 + 3 y^2)."""
     compiled = nlctl.compile(loop(update))
@@ -288,6 +317,24 @@ def test_a_search_by_halves_is_called_as_it_stands(update):
     with pytest.warns(errors.InexactWarning):
         slope = compiled.linearize([10.0], []).A
     np.testing.assert_allclose(slope, -1 / 13, rtol=1e-4)
+
+
+def sorted_by_exchanges(t, x, u, params):
+    """The third of seven numbers: 36 comparisons in turn that exchange, and narrow nothing."""
+    row = [x[0], 0.5, x[0] ** 2, 1.5, 2 * x[0], 0.25, 3.0]
+    for _ in range(6):
+        for i in range(6):
+            a, b = row[i], row[i + 1]
+            row[i], row[i + 1] = np.where(a > b, b, a), np.where(a > b, a, b)
+    return [-row[2]]
+
+
+def test_sorting_by_exchanges_is_no_search_by_halves():
+    """The third of seven is x at 0.45, x^2 at 0.8."""
+    compiled = nlctl.compile(loop(sorted_by_exchanges))
+    assert not compiled.equations.calls
+    np.testing.assert_allclose(compiled.linearize([0.45], []).A, -1.0, rtol=1e-12)
+    np.testing.assert_allclose(compiled.linearize([0.8], []).A, -1.6, rtol=1e-12)
 
 
 def counted_above(t, x, u, params):
