@@ -210,4 +210,5 @@ def _response(
         success=message is None, message=message,
     )  # fmt: skip
     response.statistics, response.happened = reached.statistics, reached.happened
+    response.clock_times = reached.clock_times
     return response

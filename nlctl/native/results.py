@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,7 @@ class Trajectory:
     statistics: Statistics
     inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
     happened: EventLog = NO_EVENTS  # of a single run
+    clock_times: np.ndarray = field(default_factory=lambda: np.zeros(0))  # when clocks tick (s)
     culprit: int = -1  # the guard that has fallen last, or has ended it
     guard: float = 0.0  # and its value
     since: float = np.nan  # time of the first of the jumps that have ended it
@@ -93,12 +94,19 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         states=states,
         statistics=statistics,
         inputs=_every_input(run, j, done),
+        clock_times=_clock_times(run, j, reached),
         culprit=int(lane["culprit"]),
         since=float(lane["since"]),
         guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
         if lane["culprit"] >= 0
         else 0.0,
     ).cut_short(run.machine.lowered.cut)
+
+
+def _clock_times(run: Any, j: int, reached: float) -> np.ndarray:
+    """Return when something was due to sampled blocks in lane `j`, until a time."""
+    ticks = run.task.clocks.ticks
+    return ticks[j][ticks[j] <= reached] if ticks.size else np.zeros(0)
 
 
 def _every_input(run: Any, j: int, done: int) -> np.ndarray:

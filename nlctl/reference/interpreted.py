@@ -137,6 +137,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
         labels_of(system), **form,
     )  # fmt: skip
     response.happened = event_log(driver.happened)
+    response.clock_times = np.array([t for t in driver.stops.due if t <= driver.reached])
     return response
 
 

@@ -13,16 +13,20 @@ from ..errors import ParameterError
 from ..upstream.systems import SystemResponse
 
 _ENOUGH = 9  # samples between two breaks: a curve goes through so many
+_SAME = 5e-3  # of the time between them: samples that are no further apart are one
 _AT_ONCE = 1e-9  # of the time covered: breaks that are no further apart are one
 
 
 def breaks_of(response: SystemResponse) -> np.ndarray | None:
     """Return the times of the events of a response, in order and each once.
 
+    Ticks of clocks, at which held signals jump, are among them where there are samples in between.
+
     Parameters
     ----------
     response : ct.TimeResponseData
-        Its ``events``, if it has any, are a table with a column ``time`` (s).
+        Its ``events``, if it has any, are a table with a column ``time`` (s), its ``clock_times``
+        an array (s).
 
     Returns
     -------
@@ -47,13 +51,22 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
     if events is None or "time" not in getattr(events, "columns", ()):
         return None
     breaks = np.unique(np.asarray(events["time"], dtype=float))
-    for begin, end in unsampled(getattr(response, "time", breaks[:0]), breaks)[:1]:
+    times = getattr(response, "time", breaks[:0])
+    for begin, end in unsampled(times, breaks)[:1]:
         raise ParameterError(
             f"breaks_of needs samples between all events, got none in the {end - begin:.3g} s from "
             f"t = {begin:.6g} s on: simulate again with evaluation_times=nlctl.analysis.metrics."
             "sampled_between(times, response.events['time'])"
         )
-    return breaks
+    return with_clocks(breaks, getattr(response, "clock_times", breaks[:0]), times)
+
+
+def with_clocks(breaks: np.ndarray, ticks: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return breaks with the ticks of clocks on both sides of which `times` has samples."""
+    # A clock that is faster than the samples says nothing of signals between them.
+    every = np.union1d(breaks, ticks)
+    silent = unsampled(times, every)
+    return every[~np.isin(every, silent) | np.isin(every, breaks)]
 
 
 def sampled_between(times: ArrayLike, breaks: ArrayLike) -> np.ndarray:
@@ -97,7 +110,14 @@ def sampled_between(times: ArrayLike, breaks: ArrayLike) -> np.ndarray:
     begin, end, count = _between(t, np.unique(np.asarray(breaks, dtype=float)))
     few = count < _ENOUGH
     share = 0.5 - 0.5 * np.cos(np.pi * (np.arange(_ENOUGH) + 0.5) / _ENOUGH)
-    return np.union1d(t, begin[few, None] + share * (end - begin)[few, None])
+    long = (end - begin)[few, None]
+    more = begin[few, None] + share * long
+    if not more.size:
+        return t
+    # two at nearly one time would tell curves nothing but rounding
+    place = np.clip(np.searchsorted(t, more), 1, max(t.size - 1, 1))
+    near = np.minimum(np.abs(more - t[place - 1]), np.abs(more - t[np.minimum(place, t.size - 1)]))
+    return np.union1d(t, more[near > _SAME * long])
 
 
 def unsampled(times: ArrayLike, breaks: np.ndarray) -> np.ndarray:

@@ -66,6 +66,29 @@ def test_times_with_enough_samples_are_kept():
     assert np.sum((finer > 0.51) & (finer < 0.52)) == 9
 
 
+def test_no_two_samples_are_at_nearly_one_time():
+    """Of 0.55 and what rounding makes of it a curve would learn rounding."""
+    times = np.linspace(0, 10, 801)
+    breaks = np.sort(np.concatenate([np.arange(0.25, 10, 0.25), np.arange(0.1, 10, 0.25)]))
+    assert np.diff(sampled_between(times, breaks)).min() > 1e-4
+
+
+@pytest.mark.parametrize("engine", ["native", "python-control"])
+def test_a_clock_that_is_faster_than_samples_gives_no_breaks(engine):
+    """A held ramp: its steps are breaks where there are samples in between."""
+    held = nlctl.sampled(ct.ss([], [], [], [[1.0]], 0.1, inputs="u", outputs="v", name="held"))
+    ramp = ct.nlsys(None, lambda t, x, u, p: [t], inputs=0, outputs="u", name="ramp")
+    loop = nlctl.interconnect({"ramp": ramp, "held": held}, outputs=["v"])
+    fine = nlctl.input_output_response(loop, np.linspace(0, 1, 201), engine=engine)
+    np.testing.assert_allclose(breaks_of(fine)[1:-1], np.arange(1, 10) / 10, atol=1e-12)
+    coarse = nlctl.input_output_response(loop, np.linspace(0, 1, 5), engine=engine)
+    assert np.isin(coarse.clock_times, breaks_of(coarse)).sum() <= 5
+    late = always(in_band("v", lower=0.35, scale=1.0), 0.42, 1.0)  # it is 0.4 from 0.4 on
+    asked = Requirement(key="asked", formula=late, until=1.0)
+    found = margin(asked, fine.time, {"v": fine.outputs.ravel()}, breaks=breaks_of(fine))
+    assert found == pytest.approx(0.05, abs=1e-9)
+
+
 def test_windows_over_a_run_without_events_are_of_its_curve():
     """max of sin over [t, t + 3] is least where both ends are equal: -cos(1.5)."""
     swing = ct.nlsys(lambda t, x, u, p: [x[1], -x[0]], lambda t, x, u, p: [x[0]], states=2,

@@ -19,6 +19,9 @@ ACTUATORS = {
     "dead zone": nlctl.DeadZone(),
     "relay": nlctl.Relay(on=0.2, off=-0.2),
     "backlash": nlctl.Backlash(),
+    "a law at a clock": nlctl.sampled(
+        ct.ss([], [], [], [[0.7]], 0.37, inputs="u", outputs="v", name="held")
+    ),
 }
 
 
