@@ -29,7 +29,7 @@ from ..responses.arguments import (
     interpolated,
     with_aliases,
 )
-from ..responses.breaks import sampled_between, takes_breaks, unsampled, with_clocks
+from ..responses.breaks import sampled_between, takes_breaks, unsampled, with_jumps
 from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
@@ -324,7 +324,7 @@ def _row(run: Trajectory, labels: Sequence[str], asked: _Asked) -> dict[str, Any
         return row | {metric.key: np.nan for metric in metrics}
     signals = {signal for metric in metrics for signal in metric.signals}
     samples = {signal: run.outputs[labels.index(signal)].copy() for signal in signals}
-    breaks = with_clocks(np.unique(run.happened.time), run.clock_times, run.time)
+    breaks = with_jumps(np.unique(run.happened.time), run.jump_times, run.time)
     for metric, takes in zip(metrics, asked.with_breaks, strict=True):
         first = np.searchsorted(run.time, metric.start, "left")
         inside = slice(first, np.searchsorted(run.time, metric.end, "right"))

@@ -210,5 +210,5 @@ def _response(
         success=message is None, message=message,
     )  # fmt: skip
     response.statistics, response.happened = reached.statistics, reached.happened
-    response.clock_times = reached.clock_times
+    response.jump_times = reached.jump_times
     return response

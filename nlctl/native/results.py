@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..attributes import described_record
+from ..responses.breaks import jump_times
 from ..responses.event_log import NO_EVENTS, EventLog
 from .chattering.steps import Jump
 from .integrate.state import Status
@@ -48,13 +49,20 @@ class Trajectory:
     statistics: Statistics
     inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
     happened: EventLog = NO_EVENTS  # of a single run
-    clock_times: np.ndarray = field(default_factory=lambda: np.zeros(0))  # when clocks tick (s)
+    ticks: np.ndarray = field(default_factory=lambda: np.zeros(0))  # when clocks tick (s)
+    delays: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of signals (s)
     culprit: int = -1  # the guard that has fallen last, or has ended it
     guard: float = 0.0  # and its value
     since: float = np.nan  # time of the first of the jumps that have ended it
     # functions, by their blocks' places and kinds, of which a loop may have ended it that takes
     # more passes than are written out, or that were called for that
     cut: frozenset[tuple[int, str]] = frozenset()
+
+    @property
+    def jump_times(self) -> np.ndarray:
+        """When held and delayed signals may jump (s), besides at events."""
+        happened = np.append(self.time[:1], self.happened.time)  # at first a history ends
+        return jump_times(happened, self.ticks, self.delays)
 
     def cut_short(self, cut: frozenset[tuple[int, str]]) -> Trajectory:
         """Return it with the functions of which a loop may have ended it, if one may."""
@@ -94,7 +102,8 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         states=states,
         statistics=statistics,
         inputs=_every_input(run, j, done),
-        clock_times=_clock_times(run, j, reached),
+        ticks=_ticks(run, j, reached),
+        delays=run.task.lines.delays[:, j].copy() if run.task.lines.delays.size else np.zeros(0),
         culprit=int(lane["culprit"]),
         since=float(lane["since"]),
         guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
@@ -103,7 +112,7 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
     ).cut_short(run.machine.lowered.cut)
 
 
-def _clock_times(run: Any, j: int, reached: float) -> np.ndarray:
+def _ticks(run: Any, j: int, reached: float) -> np.ndarray:
     """Return when something was due to sampled blocks in lane `j`, until a time."""
     ticks = run.task.clocks.ticks
     return ticks[j][ticks[j] <= reached] if ticks.size else np.zeros(0)

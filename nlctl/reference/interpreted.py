@@ -21,6 +21,7 @@ from ..responses.arguments import (
     interpolated,
     state_array,
 )
+from ..responses.breaks import jump_times
 from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, labels_of, response_of
 from ..sampling.system import happening
@@ -137,8 +138,15 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
         labels_of(system), **form,
     )  # fmt: skip
     response.happened = event_log(driver.happened)
-    response.clock_times = np.array([t for t in driver.stops.due if t <= driver.reached])
+    response.jump_times = _jump_times(driver, begin)
     return response
+
+
+def _jump_times(driver: Driver, begin: float) -> np.ndarray:
+    """Return when held and delayed signals may jump (s), besides at events."""
+    happened = np.array([begin, *(event[0] for event in driver.happened)])
+    ticks = np.array([t for t in driver.stops.due if t <= driver.reached])
+    return jump_times(happened, ticks, np.array([spec.delay for spec in driver.known.specs]))
 
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:

@@ -13,6 +13,7 @@ from ..errors import ParameterError
 from ..upstream.systems import SystemResponse
 
 _ENOUGH = 9  # samples between two breaks: a curve goes through so many
+_IN_SERIES = 3  # delays through which jumps are followed
 _SAME = 5e-3  # of the time between them: samples that are no further apart are one
 _AT_ONCE = 1e-9  # of the time covered: breaks that are no further apart are one
 
@@ -20,12 +21,13 @@ _AT_ONCE = 1e-9  # of the time covered: breaks that are no further apart are one
 def breaks_of(response: SystemResponse) -> np.ndarray | None:
     """Return the times of the events of a response, in order and each once.
 
-    Ticks of clocks, at which held signals jump, are among them where there are samples in between.
+    Ticks of clocks, at which held signals jump, and what comes out of constant delays are among
+    them where there are samples in between.
 
     Parameters
     ----------
     response : ct.TimeResponseData
-        Its ``events``, if it has any, are a table with a column ``time`` (s), its ``clock_times``
+        Its ``events``, if it has any, are a table with a column ``time`` (s), its ``jump_times``
         an array (s).
 
     Returns
@@ -51,20 +53,30 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
     if events is None or "time" not in getattr(events, "columns", ()):
         return None
     breaks = np.unique(np.asarray(events["time"], dtype=float))
-    times = getattr(response, "time", breaks[:0])
+    times = np.asarray(getattr(response, "time", breaks[:0]), dtype=float)
     for begin, end in unsampled(times, breaks)[:1]:
         raise ParameterError(
             f"breaks_of needs samples between all events, got none in the {end - begin:.3g} s from "
             f"t = {begin:.6g} s on: simulate again with evaluation_times=nlctl.analysis.metrics."
             "sampled_between(times, response.events['time'])"
         )
-    return with_clocks(breaks, getattr(response, "clock_times", breaks[:0]), times)
+    return with_jumps(breaks, getattr(response, "jump_times", breaks[:0]), times)
 
 
-def with_clocks(breaks: np.ndarray, ticks: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return breaks with the ticks of clocks on both sides of which `times` has samples."""
+def jump_times(happened: np.ndarray, ticks: np.ndarray, delays: np.ndarray) -> np.ndarray:
+    """Return when clocks tick and when jumps come out of delays, also out of one behind another."""
+    jumps = fresh = np.union1d(happened, ticks)
+    for _ in range(min(delays.size, _IN_SERIES)):
+        fresh = np.unique(fresh[:, None] + delays)
+        jumps = np.union1d(jumps, fresh)
+    return jumps
+
+
+def with_jumps(breaks: np.ndarray, jumps: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return breaks with the jumps on both sides of which `times` has samples."""
     # A clock that is faster than the samples says nothing of signals between them.
-    every = np.union1d(breaks, ticks)
+    inside = (jumps > times[0]) & (jumps < times[-1]) if times.size else np.zeros_like(jumps, bool)
+    every = np.union1d(breaks, jumps[inside])
     silent = unsampled(times, every)
     return every[~np.isin(every, silent) | np.isin(every, breaks)]
 

@@ -57,8 +57,9 @@ class Response(ct.TimeResponseData):
         Status, time reached, steps and events of a run in machine code.
     happened : EventLog
         What is in `events`.
-    clock_times : ndarray of shape (n,)
-        When clocks of sampled blocks have ticked (s): held signals jump there.
+    jump_times : ndarray of shape (n,)
+        When held and delayed signals may jump (s), besides at events: where clocks tick, and where
+        what jumps comes out of constant delays.
     state_names : list of str
         Qualified names of the states, ``"plant.x1"``.
     wires : Wires
@@ -67,7 +68,7 @@ class Response(ct.TimeResponseData):
 
     statistics: Any = None
     happened: EventLog = NO_EVENTS
-    clock_times: np.ndarray = np.zeros(0)
+    jump_times: np.ndarray = np.zeros(0)
     state_names: Sequence[str] = ()
     wires: Wires = Wires()
 

@@ -80,9 +80,9 @@ def test_a_clock_that_is_faster_than_samples_gives_no_breaks(engine):
     ramp = ct.nlsys(None, lambda t, x, u, p: [t], inputs=0, outputs="u", name="ramp")
     loop = nlctl.interconnect({"ramp": ramp, "held": held}, outputs=["v"])
     fine = nlctl.input_output_response(loop, np.linspace(0, 1, 201), engine=engine)
-    np.testing.assert_allclose(breaks_of(fine)[1:-1], np.arange(1, 10) / 10, atol=1e-12)
+    np.testing.assert_allclose(breaks_of(fine), np.arange(1, 10) / 10, atol=1e-12)
     coarse = nlctl.input_output_response(loop, np.linspace(0, 1, 5), engine=engine)
-    assert np.isin(coarse.clock_times, breaks_of(coarse)).sum() <= 5
+    assert np.isin(coarse.jump_times, breaks_of(coarse)).sum() <= 3
     late = always(in_band("v", lower=0.35, scale=1.0), 0.42, 1.0)  # it is 0.4 from 0.4 on
     asked = Requirement(key="asked", formula=late, until=1.0)
     found = margin(asked, fine.time, {"v": fine.outputs.ravel()}, breaks=breaks_of(fine))

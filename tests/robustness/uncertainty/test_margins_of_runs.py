@@ -13,12 +13,21 @@ END = 10.0
 T, FINE = np.linspace(0, END, 801), np.linspace(0, END, 100_001)
 OWN = ct.nlsys(None, lambda t, x, u, p: [np.clip(u[0], -1, 1)], inputs=["u"], outputs=["v"],
                name="own")  # fmt: skip
+LATE = ct.interconnect(
+    [
+        nlctl.block(nlctl.Relay(on=0.2, off=-0.2), "relay"),
+        nlctl.block(nlctl.TransportDelay(delay=0.1137), "late", inputs="w", outputs="v"),
+    ],
+    connections=[["late.w", "relay.v"]], inplist=["relay.u"], outlist=["late.v"], inputs=["u"],
+    outputs=["v"], name="relay behind a delay",
+)  # fmt: skip
 ACTUATORS = {
     "saturation": nlctl.Saturation(limit=1.0),
     "a function of one's own": OWN,
     "dead zone": nlctl.DeadZone(),
     "relay": nlctl.Relay(on=0.2, off=-0.2),
     "backlash": nlctl.Backlash(),
+    "a relay and a delay": LATE,
     "a law at a clock": nlctl.sampled(
         ct.ss([], [], [], [[0.7]], 0.37, inputs="u", outputs="v", name="held")
     ),
