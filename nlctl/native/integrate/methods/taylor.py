@@ -339,7 +339,7 @@ def _error(task, w, j):
     # In a step with an event the right-hand side has changed before the end: the last term counts.
     defect, term = w.taylor.largest[0, j], w.taylor.largest[1, j]
     if w.inside.looked[j] != 0.0:  # on another side inside: a shorter step is to be tried
-        part = min(max(w.inside.foreseen[j], _LEAST), 0.8)
+        part = min(max(w.inside.foreseen[j], _LEAST, _shortest(task) / w.h[j]), 0.8)
         return (0.9 / part) ** task.pair.order + 0.0 * (defect + term)
     for i in range(task.rows.switching):
         if _meets(task, w, i, w.events.g[i, j], j):
