@@ -16,7 +16,7 @@ OWN = ct.nlsys(None, lambda t, x, u, p: [np.clip(u[0], -1, 1)], inputs=["u"], ou
 LATE = ct.interconnect(
     [
         nlctl.block(nlctl.Relay(on=0.2, off=-0.2), "relay"),
-        nlctl.block(nlctl.TransportDelay(delay=0.1137), "late", inputs="w", outputs="v"),
+        nlctl.block(nlctl.TransportDelay(delay=0.457), "late", inputs="w", outputs="v"),
     ],
     connections=[["late.w", "relay.v"]], inplist=["relay.u"], outlist=["late.v"], inputs=["u"],
     outputs=["v"], name="relay behind a delay",
