@@ -7,6 +7,7 @@ out hardly does: a staircase of 2^40 steps, none of which is a jump.  Its deriva
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import permutations
 
 from .graph import ORDERS, Expr, Graph, Untraceable, needed
@@ -36,53 +37,67 @@ class Halving:
 
 def asked_in_turn(computed: set[Expr]) -> set[Expr]:
     """Return what is computed of earlier answers where there are many; refuse a staircase."""
-    depths: dict[Expr, int] = {}
-    flows: dict[Expr, bool] = {}  # whether it moves while all answers are what they are
-    for node in needed(computed):
-        asks = node.op in ORDERS and node.varies and node in computed
-        depths[node] = max((depths[arg] for arg in node.args), default=0) + asks
-        chosen = node.args[1:] if node.op == "select" else node.args
-        moves = node.op == "leaf" or any(flows[arg] for arg in chosen)
-        flows[node] = moves and node.varies and node.kind != "b"
+    nodes = needed(computed)
+    asking = {node for node in nodes if node.op in ORDERS and node.varies and node in computed}
+    depths = _depths(nodes, asking)
     if max(depths.values(), default=0) < _HALVINGS:
         return set()
-    if _narrowed(computed) >= _HALVINGS:
-        raise Staircase("a search by halves, of whose derivative no pass knows")
     deep = {node for node in computed if depths[node] > (node.op in ORDERS)}
-    stands = (n for n in deep if n.op in _MADE and n.varies and n.kind == "f" and not flows[n])
-    if any(depths[node] >= _HALVINGS - 1 for node in stands):
+    flowing = _flowing(nodes)
+    stands = [n for n in deep if n.op in _MADE and n.varies and n.kind == "f" and n not in flowing]
+    narrowed = _depths(nodes, _narrowing(nodes))
+    if max(narrowed.values()) >= _HALVINGS or any(depths[n] >= _HALVINGS - 1 for n in stands):
         raise Staircase("a search by halves, of whose derivative no pass knows")
     return deep
 
 
-def _narrowed(computed: set[Expr]) -> int:
-    """Return how often at most a bracket is narrowed in turn: one end becomes what is between."""
-    # `if above: high = middle`, `else: low = middle`; where two are exchanged they are sorted
+def _depths(nodes: Iterable[Expr], counted: set[Expr]) -> dict[Expr, int]:
+    """Return of how many expressions of a set each is computed at most, one of the other."""
+    depths: dict[Expr, int] = {}
+    for node in nodes:
+        depths[node] = max((depths[arg] for arg in node.args), default=0) + (node in counted)
+    return depths
+
+
+def _flowing(nodes: Iterable[Expr]) -> set[Expr]:
+    """Return what moves while all answers are what they are."""
+    flowing = set[Expr]()
+    for node in nodes:
+        chosen = node.args[1:] if node.op == "select" else node.args
+        moves = node.op == "leaf" or any(arg in flowing for arg in chosen)
+        if moves and node.varies and node.kind != "b":
+            flowing.add(node)
+    return flowing
+
+
+def _narrowing(nodes: Iterable[Expr]) -> set[Expr]:
+    """Return the conditions by which a bracket is narrowed: an end becomes what is between both."""
+    # `if above: high = middle`, `else: low = middle`, of golden sections two such places
     choices: dict[Expr, list[Expr]] = {}
-    nodes = needed(computed)
     for node in nodes:
         if node.op == "select":
             choices.setdefault(node.args[0], []).append(node)
-    narrowing = {
+    return {
         condition
         for condition, chosen in choices.items()
-        for one, other in permutations(chosen, 2)
-        if one.args[1] is other.args[2]
-        and one.args[2] is not other.args[1]
-        and one.args[1].op in _MADE
-        and _is_between(one.args[1])
+        for (_, new_high, high), (_, low, new_low) in permutations([c.args for c in chosen], 2)
+        if {low, high} <= _combined(new_high) and {low, high} <= _combined(new_low)
     }
-    depths: dict[Expr, int] = {}
-    for node in nodes:
-        depths[node] = max((depths[arg] for arg in node.args), default=0) + (node in narrowing)
-    return max(depths.values(), default=0)
 
 
-def _is_between(middle: Expr) -> bool:
-    """Whether something is an affine combination of what was chosen, as secants are not."""
-    if middle.op in ("const", "select"):
-        return True
-    parts = middle.args
-    if middle.op in ("mul", "div") and any(arg.op == "const" for arg in parts):
-        return all(map(_is_between, parts))
-    return middle.op in ("add", "sub", "neg") and all(map(_is_between, parts))
+def _combined(middle: Expr) -> set[Expr]:
+    """Return of which choices and numbers something is an affine combination, as no secant is."""
+    if middle.op not in _MADE:
+        return set()
+    combined, waiting = set[Expr](), [middle]
+    while waiting:
+        node = waiting.pop()
+        if node.op in ("const", "select"):
+            combined.add(node)
+        elif node.op in ("add", "sub", "neg") or (
+            node.op in ("mul", "div") and any(arg.op == "const" for arg in node.args)
+        ):
+            waiting += node.args
+        else:
+            return set()
+    return combined

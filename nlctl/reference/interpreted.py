@@ -146,7 +146,8 @@ def _jump_times(driver: Driver, begin: float) -> np.ndarray:
     """Return when held and delayed signals may jump (s), besides at events."""
     happened = np.array([begin, *(event[0] for event in driver.happened)])
     ticks = np.array([t for t in driver.stops.due if t <= driver.reached])
-    return jump_times(happened, ticks, np.array([spec.delay for spec in driver.known.specs]))
+    delays = np.array([spec.delay for spec in driver.known.specs])
+    return jump_times(happened, ticks, delays)
 
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:

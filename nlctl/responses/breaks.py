@@ -65,6 +65,8 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
 
 def jump_times(happened: np.ndarray, ticks: np.ndarray, delays: np.ndarray) -> np.ndarray:
     """Return when clocks tick and when jumps come out of delays, also out of one behind another."""
+    if not delays.size:
+        return ticks
     jumps = fresh = np.union1d(happened, ticks)
     for _ in range(min(delays.size, _IN_SERIES)):
         fresh = np.unique(fresh[:, None] + delays)

@@ -287,6 +287,11 @@ def halves_of_a_state(t, x, u, params):
     return [-middle]
 
 
+def bisected_around(t, x, u, params):
+    """The same by SciPy, in a bracket that follows the state."""
+    return [-optimize.bisect(lambda y: y + y**3 - x[0], -1.0 - abs(x[0]), 1.0 + abs(x[0]))]
+
+
 def where_signs_differ(t, x, u, params):
     """The same, with the value at one end."""
     a, b = 0.0, 1.0 + abs(x[0])
@@ -303,7 +308,10 @@ def where_signs_differ(t, x, u, params):
 
 @pytest.mark.parametrize(
     "update",
-    [by_halves, halves_to_a_tolerance, bisected, halves_of_a_state, where_signs_differ],
+    [
+        *(by_halves, halves_to_a_tolerance, bisected),
+        *(halves_of_a_state, bisected_around, where_signs_differ),
+    ],
 )
 def test_a_search_by_halves_is_called_as_it_stands(update):
     """With y + y^3 = x and x' = -y: ln(y / y0) + 3 (y^2 - y0^2) / 2 = -t, dy/dx = 1/(1 + 3 y^2)."""
@@ -317,6 +325,26 @@ def test_a_search_by_halves_is_called_as_it_stands(update):
     with pytest.warns(errors.InexactWarning):
         slope = compiled.linearize([10.0], []).A
     np.testing.assert_allclose(slope, -1 / 13, rtol=1e-4)
+
+
+def by_golden_sections(t, x, u, params):
+    """The place of the least (y - x / 2)^2, between two that follow the state."""
+    part, a, b = (np.sqrt(5.0) - 1.0) / 2, x[0] - 2.0, x[0] + 3.0
+    for _ in range(45):
+        c, d = b - part * (b - a), a + part * (b - a)
+        if (c - 0.5 * x[0]) ** 2 < (d - 0.5 * x[0]) ** 2:
+            b = d
+        else:
+            a = c
+    return [-(a + b) / 2]
+
+
+def test_golden_sections_are_a_search_by_halves():
+    compiled = nlctl.compile(loop(by_golden_sections))
+    (call,) = compiled.equations.calls.values()
+    assert "a search by halves" in call.reason
+    with pytest.warns(errors.InexactWarning):
+        np.testing.assert_allclose(compiled.linearize([0.5], []).A, -0.5, atol=1e-3)
 
 
 def sorted_by_exchanges(t, x, u, params):

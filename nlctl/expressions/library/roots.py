@@ -105,9 +105,10 @@ def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
         if is_root:
             return root
         width = 0.5 * width
-        root = left + width
+        root = 0.5 * (left + right)  # between both, so that it is known for what it is
         value = f(root, *args)
-        left = np.where(value * first > 0, root, left)
+        left, right = (np.where(value * first > 0, root, left),
+                       np.where(value * first > 0, right, root))  # fmt: skip
         if value == 0 or abs(width) < xtol + rtol * abs(root):
             return root
     raise RuntimeError("Failed to converge")

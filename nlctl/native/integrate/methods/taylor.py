@@ -21,7 +21,7 @@ from ...machine.address import (
     call_step,
     call_values,
 )
-from ..control import LEAST_PART
+from ..control import LEAST_PART, SMALLEST
 from ..evaluate import hold_memories, input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
@@ -312,7 +312,7 @@ def _behind(task, lane, i, root):
     part = root * (1.0 + _rest(task, i))
     if i < task.rows.declared:
         return part
-    return max(part, root + 4e-16 * abs(lane.t + root * lane.step) / lane.step)
+    return max(part, root + SMALLEST * abs(lane.t + root * lane.step) / lane.step)
 
 
 @numba.njit(**INNER)
