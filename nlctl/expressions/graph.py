@@ -166,6 +166,7 @@ class Graph:
         self.implied: dict[Expr, bool] = {}  # what follows from that
         # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
+        self.nominal: dict[int, float] = {}  # values of other parameters now, by place in `p`
         # what is computed in passes of loops that may have ended, a set for each such loop
         self.passing: list[set[Expr]] = []
         self.of_passes: set[Expr] = set()  # what only later passes of such loops compute

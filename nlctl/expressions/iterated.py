@@ -19,7 +19,6 @@ import numpy as np
 
 from .arrays import Tracer, scalar
 from .graph import Expr, Graph, Untraceable
-from .halving import asked_in_turn
 from .merged import call_instead, chosen, later, truth_test, truth_value
 from .operators import elementwise
 
@@ -377,7 +376,6 @@ class Loop:
         if self.passes:
             self.graph.passing.pop()
         self.graph.of_passes |= self.later - self.first
-        asked_in_turn(self.first | self.later)  # which refuses a staircase
         if self.is_cut:
             self.graph.limited(self.graph.op("not", self.running))
             self.running = self.graph.const(False)

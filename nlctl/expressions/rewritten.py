@@ -22,12 +22,12 @@ import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
-from .halving import Halving
 from .iterated import NOT_RETURNED, Loop, PassWriter
 from .library.ordered import sorted_list
 from .library.table import unwrapped
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
 from .operators import elementwise
+from .passes import Passes
 from .promoted import is_numpys
 from .source import Definition, Unreadable, definition
 
@@ -287,7 +287,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
         INSTEAD_NAME.format("same"): lambda a, b: _behind(a) is _behind(b),
         INSTEAD_NAME.format("class"): _pattern_type,
-        INSTEAD_NAME.format("passes"): lambda: Halving(graph),
+        INSTEAD_NAME.format("passes"): lambda: Passes(graph),
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),

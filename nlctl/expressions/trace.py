@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import math
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +30,11 @@ from .graph import (
     Untraceable,
     catchable,
 )
-from .halving import Staircase
 from .operators import elementwise
 from .rewritten import Unfollowed, is_raised
 from .stage import Stage
 from .staged import LIBRARIES
+from .staircases import Staircase, check_slopes
 
 PATHS = 128  # paths through one function that are followed
 _UNLIKELY = 1e-3  # probability below which something is taken not to be so
@@ -90,6 +90,8 @@ def _traced(
         result = _followed(graph, lambda: _flat(graph, run()), {}, left)
         if result is None:
             raise Untraceable("it raises an error on every path")
+        graph.limit = UNLIMITED
+        check_slopes(graph, _numbers([result]), _numbers(arguments()))
         return result
     except Ambiguous:
         raise
@@ -189,6 +191,11 @@ def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
     if left[0] < 0:
         raise Untraceable(f"more than {PATHS} paths through it")
     return result
+
+
+def _numbers(values: Iterable[object]) -> list[Expr]:
+    """Return the expressions that arrays are made of."""
+    return [e for array in values if isinstance(array, Tracer) for e, _ in array.pieces()]
 
 
 def _place(error: BaseException) -> str:

@@ -49,6 +49,8 @@ def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> An
         leaf = graph.leaf("p", slot.offset, None, kind="i", value=now)
         return scalar(graph, leaf)
     whole = leaf_vector(graph, "p", slot.offset, slot.shape)
+    now = np.ravel(value) if p is None else p[slot.offset : slot.offset + slot.size]
+    graph.nominal.update(enumerate(now, slot.offset))
     if slot.kind == "b":
         return elementwise(graph, "ne", whole, 0.0)
     named = isinstance(value, tuple) and hasattr(value, "_fields") and len(slot.shape) == 1
