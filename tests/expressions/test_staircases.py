@@ -1,4 +1,4 @@
-"""Searches of many passes: where differences and expressions have other slopes, Python is called."""
+"""Searches of many passes: Python is called where expressions have not the slope of differences."""
 
 import control as ct
 import numpy as np
@@ -39,7 +39,7 @@ def copied_signs(t, x, u, params):
 
 
 def bits(t, x, u, params):
-    """The most significant bits first, as an analogue-to-digital converter of 30 bits finds them."""
+    """The most significant bits first, as an analogue-to-digital converter finds them."""
     y = 0.0
     for k in range(30):
         more = y + 4.0 * 0.5**k
