@@ -40,13 +40,14 @@ def nouns():
                 yield f"{one.split()[-1]}s"
 
 
-def counts(tree):
-    """Yield line, value and what follows, where a text has a value before a word."""
+def counts(tree, plural):
+    """Yield line and value, where a text has a value before one of these words."""
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             for value, rest in itertools.pairwise(node.values):
-                if isinstance(value, ast.FormattedValue) and isinstance(rest, ast.Constant):
-                    yield node.lineno, ast.unparse(value.value), rest.value
+                is_of_value = isinstance(value, ast.FormattedValue)
+                if is_of_value and isinstance(rest, ast.Constant) and plural.match(rest.value):
+                    yield node.lineno, ast.unparse(value.value)
 
 
 SEVERAL = {  # never one: of a fixed size, or another text is written for one
@@ -71,8 +72,8 @@ def test_what_is_counted_is_counted_in_one_way():
     found = {
         (name, value): line
         for name, tree in MODULES.items()
-        for line, value, rest in counts(tree)
-        if plural.match(rest) and not NO_COUNT.search(value)
+        for line, value in counts(tree, plural)
+        if not NO_COUNT.search(value)
     }
     assert {place: line for place, line in found.items() if place not in SEVERAL} == {}
     assert found.keys() == SEVERAL, "named here and not there any more"
