@@ -68,15 +68,23 @@ class Ledger:
         return tuple(x for x in self.lines if x.status == "undecided" and x.reading == "corrected")
 
     @property
-    def holds(self) -> bool:
-        """Whether no corrected statement is violated."""
-        return not self.violated
+    def holds(self) -> bool | None:
+        """Whether all corrected statements hold; None if one is undecided and none violated."""
+        return {"holds": True, "violated": False}.get(self.answer)
 
     @property
     def answer(self) -> str:
         """Of all corrected statements: "violated" if one is, else "undecided" if one is, else
         "holds"."""
         return "violated" if self.violated else "undecided" if self.undecided else "holds"
+
+    @property
+    def tally(self) -> str:
+        """How many corrected statements hold, of how many, and how many are undecided."""
+        corrected = [x for x in self.lines if x.reading == "corrected"]
+        kept = len(corrected) - len(self.violated) - len(self.undecided)
+        open_ones = f", {len(self.undecided)} undecided" if self.undecided else ""
+        return f"{kept} of {len(corrected)}{open_ones}"
 
     def __getitem__(self, key: str) -> Line:
         for line in self.lines:

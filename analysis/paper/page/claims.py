@@ -125,16 +125,15 @@ def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
     claims = []
     for number, one in proofs.items():
         lines, bound = one.ledger, one.certificate.C_0
-        checked = [line for line in lines.lines if line.reading == "corrected"]
         claims += [
             Claim(
                 text=f"Example {number}: the steps of the proof, corrected where possible, hold "
                 f"along a run of {HORIZON:g} s",
-                measured=f"{len(checked) - len(lines.violated)} of {len(checked)} lines",
-                limit=f"all {len(checked)}",
-                holds=lines.holds,
+                measured=f"lines that hold: {lines.tally}",
+                limit="none violated",
+                holds=not lines.violated,
                 evidence=f"proof-{number}",
-                status="checked" if lines.holds else "violated",
+                status="violated" if lines.violated else "checked",
             ),
             Claim(
                 text=f"Example {number}, with the sign of the gain known: |r| is bounded for all "
