@@ -104,7 +104,7 @@ def on_balls(
         except (Undecided, UsageError):
             raise
         except Exception as error:  # a user's function may raise whatever it likes
-            raise refusal(f"{type(error).__name__}: {error}") from error
+            raise refusal(f"{type(error).__name__}: {error}{_instead(error)}") from error
         for part in _elements(result):
             if not isinstance(part, _NUMBERS) and part is not UNREAD:
                 raise refusal(f"it gives {_kind_of(part)}, where a number is needed")
@@ -141,6 +141,12 @@ def several_numbers(function: Callable[..., Any], refusal: _Refusal) -> Callable
         raise refusal(f"it gives {_kind_of(result)}, where a tuple of numbers is needed")
 
     return called
+
+
+def _instead(error: Exception) -> str:
+    """Return what to call where a function of `math` has met something else than a float."""
+    is_of_math = isinstance(error, TypeError) and str(error).startswith("must be real number")
+    return ": call NumPy's functions, np.sin and not math.sin" if is_of_math else ""
 
 
 def _kind_of(result: object) -> str:

@@ -303,7 +303,7 @@ def _as_readable(who: str, function: _Function) -> Readable:
         return function
     if is_of_library(function):  # compared on its own
         return readable(function, function)
-    what = f"{who} needs a function of numbers, of which it holds: "
+    what = f"{who} cannot take this function: "
     return readable(one_number(function, lambda why: ParameterError(what + why)), function)
 
 

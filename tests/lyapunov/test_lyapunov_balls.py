@@ -1,5 +1,7 @@
 """Balls: they enclose what the equations compute, and never pick a branch."""
 
+import math
+
 import numpy as np
 import pytest
 from flint import arb
@@ -285,3 +287,9 @@ def test_the_least_of_numbers_keeps_its_bounds():
     assert prove(least, box, high=0.56).holds
     assert prove(least, box, low=-1e-9).holds
     assert prove(least, box, high=0.54).holds is False
+
+
+def test_functions_of_floats_alone_are_refused_with_those_that_take_any_number():
+    with pytest.raises(ParameterError, match=r"np\.sin and not math\.sin"):
+        enclose(lambda x: math.sin(x[0]), Box.of(x=(0.0, 1.0)))
+    assert enclose(lambda x: np.sin(x[0]), Box.of(x=(0.0, 1.0))).high >= math.sin(1.0)

@@ -165,7 +165,7 @@ def of_state(function):
 def test_a_function_that_asks_is_refused(what):
     """By name, before anything is proved of it: in every function that reads balls."""
     ask = ASKS[what]
-    with pytest.raises(ParameterError, match="needs a function of numbers"):
+    with pytest.raises(ParameterError, match="cannot take this function: "):
         enclose(of_state(ask), BOX)
     with pytest.raises(ParameterError):
         prove(of_state(ask), BOX, high=100.0)
