@@ -24,6 +24,7 @@ from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
 from . import floats, jacobians
+from .derivative_audit import audited_jacobian
 from .describe import called, described
 from .diagram.checks import check_sizes
 from .diagram.parameters import length
@@ -196,7 +197,7 @@ class Compiled(Reading, StandIn):
         copy_names: bool = True,
         **names: object,
     ) -> ct.StateSpace:
-        """Return the linearization at a point, with exact derivatives.
+        """Return the linearization at a point, with exact derivatives by forward mode.
 
         Parameters
         ----------
@@ -225,27 +226,24 @@ class Compiled(Reading, StandIn):
             If there are transport delays, or the rates of inputs enter.
         ParameterError, UnknownKeywordError, UsageError
             If an argument is refused.
+        AuditError
+            If differences of python-control's own values contradict a derivative.
 
         Warns
         -----
         InexactWarning
-            If a function is called unchanged: its derivatives are differences.
-
-        Notes
-        -----
-        Forward mode on the expressions, so nothing is lost to a step width.
+            If derivatives are differences: of a function that is called unchanged, and where the
+            expressions at a point have no derivative of what they compute around it.
         """
-        for name in names:
-            if name not in _NAMED:
-                known = ("copy_names", *_NAMED)
-                raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
+        for name in [name for name in names if name not in _NAMED]:
+            known = ("copy_names", *_NAMED)
+            raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
         if isinstance(x0, ct.OperatingPoint):
             x0, u0 = x0.states, x0.inputs if u0 is None else u0
         system = self.system
-        n, m, given = system.nstates or 0, system.ninputs or 0, self.schedule.ninputs
-        directions = np.eye(n + given + length(self.program.layout), n + m)
+        n = system.nstates or 0
         jacobians.tell_of_differences(self, self.parameter_vector(params))
-        derivatives = jacobians.jacobian(self, x0, u0, t, params, directions)
+        derivatives = audited_jacobian(self, x0, u0, t, params)
         rates, outputs, dt = derivatives["dx"], derivatives["y"], system.dt
         if self.program.sampled:
             rates, outputs, dt = jacobians.over_a_period(self, derivatives)

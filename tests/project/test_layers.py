@@ -64,7 +64,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["reading"],
         ["machine"],
         ["enclosures", "floats", "jacobians"],
-        ["describe"],
+        ["derivative_audit", "describe"],
         ["compiled"],
         ["cut_delays", "ensemble_result", "integrate", "members"],
         ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"]
