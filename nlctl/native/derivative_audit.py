@@ -84,7 +84,7 @@ def _checked(
     near, matrix = [slopes(one) for one in around], matrix.copy()
     for column, way in enumerate(np.diag(sizes)):
         measured = _measured(at, point, way)
-        for row in np.flatnonzero(_contradicted(matrix @ way, measured, seen)):
+        for row in map(int, np.flatnonzero(_contradicted(matrix @ way, measured, seen))):
             words = _in_words(system, row, column, matrix, measured[1] / sizes[column])
             there = zip(near, around, strict=True)
             if all(_contradicted(m @ way, _measured(at, one, way), seen)[row] for m, one in there):
