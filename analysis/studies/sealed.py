@@ -97,8 +97,8 @@ def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
 
 
 def digest_of(content: object) -> str:
-    """Return a key of what `as_json` has returned."""
-    text = json.dumps(content, sort_keys=True, ensure_ascii=True, allow_nan=False)
+    """Return a key of what JSON can hold of a content."""
+    text = json.dumps(as_json(content), sort_keys=True, ensure_ascii=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -112,4 +112,4 @@ def file_digest(path: Path) -> str:
 
 def origin_key(origin: Mapping[str, Any]) -> str:
     """Return a key of what `origin.origin_of` returns, without values, which rounding changes."""
-    return digest_of(as_json({key: part for key, part in origin.items() if key != "values"}))
+    return digest_of({key: part for key, part in origin.items() if key != "values"})

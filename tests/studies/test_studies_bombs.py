@@ -6,8 +6,7 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from nlctl.analysis.studies.file.errors import line_numbers
-from nlctl.analysis.studies.file.toml import DEEPEST, statements
+from nlctl.analysis.studies.file.toml import DEEPEST, line_numbers, statements
 
 DOTS = ".".join(["a"] * 3000)
 MANY = ", ".join(f"o{i} = {i}" for i in range(10))

@@ -14,11 +14,10 @@ from ...robustness import bound_verdict, independent
 from ...robustness.search.degradation import degradation_curve
 from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
 from ..file.asked import Confidence, Flag, Size, Varied, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.text import margin_text
-from ..result import Result
+from ..result import Finding, Result
 from .context import CLOPPER
 
 _CAPTION = (

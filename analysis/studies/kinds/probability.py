@@ -13,11 +13,10 @@ from ...report.document import Item
 from ...robustness import bound_verdict, violation_probability
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked, Confidence
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
-from ..result import Result
-from .context import CLOPPER, HOWARD, ROBBINS, statement_numbers
+from ..result import Finding, Result
+from .context import CLOPPER, HOWARD, ROBBINS
 
 DECIDES_FIXED = (
     " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "
@@ -50,7 +49,7 @@ def _run(asked: Probability, ground: Ground) -> Finding:
     violation = violation_probability(design, margins, asked.confidence, asked.side)
     verdict = {} if asked.limit is None else vars(bound_verdict(violation, asked.limit))
     return finding_of(
-        asked, str(violation), **verdict, runs=violation.runs, numbers=statement_numbers(violation)
+        asked, str(violation), **verdict, runs=violation.runs, numbers=violation.plain()
     )
 
 

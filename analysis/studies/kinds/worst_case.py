@@ -20,12 +20,11 @@ from ...robustness.search.evaluation import margins_of
 from ...robustness.search.shrink import shrink
 from ...robustness.search.worst_case import worst_case
 from ..file.asked import Flag, Number, Varied, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import DID_NOT_END, margin_in_words, margin_text, status_text
-from ..result import Result
+from ..result import Finding, Result
 from .context import AUGER, HANSEN, SEARCHED
 
 SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
