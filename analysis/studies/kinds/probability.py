@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -31,17 +31,13 @@ class Probability(Asked):
     confidence: Confidence = 0.99
     side: Literal["upper", "lower", "both"] = "upper"
     limit: Confidence | None = Field(None, description="Claim: the upper bound is at most this.")
+    claimed: ClassVar[str] = "a violation has at most probability {limit:g}"
 
     @model_validator(mode="after")
     def _needs_upper(self) -> Probability:
         if self.side == "lower" and self.limit is not None:
             raise ValueError("a limit needs side = 'upper' or 'both', got 'lower'")
         return self
-
-    @property
-    def claim(self) -> str:
-        limit = self.limit
-        return "" if limit is None else f"a violation has at most probability {limit:g}"
 
 
 def _run(asked: Probability, ground: Ground) -> Finding:

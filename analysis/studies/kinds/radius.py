@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -34,10 +34,7 @@ class AskedRadius(Varied):
     draws: Whole = Field(459, ge=0, description="Independent draws for the statement.")
     confidence: Confidence = 0.99
     limit: Size | None = Field(None, description="Claim: none is found below this size.")
-
-    @property
-    def claim(self) -> str:
-        return "" if self.limit is None else f"no violation is found below size {self.limit:g}"
+    claimed: ClassVar[str] = "no violation is found below size {limit:g}"
 
 
 def _run(asked: AskedRadius, ground: Ground) -> Finding:

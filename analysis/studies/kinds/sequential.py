@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -25,10 +26,7 @@ class Sequential(Asked):
 
     confidence: Confidence = 0.99
     limit: Confidence = Field(description="Claim: the probability is below this.")
-
-    @property
-    def claim(self) -> str:
-        return f"the probability of a violation is below {self.limit:g}"
+    claimed: ClassVar[str] = "the probability of a violation is below {limit:g}"
 
 
 def _run(asked: Sequential, ground: Ground) -> Finding:

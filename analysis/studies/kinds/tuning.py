@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -78,12 +78,7 @@ class Tuning(Asked):
     limit: Confidence | None = Field(
         None, description="Claim: after it a violation has at most this probability."
     )
-
-    @property
-    def claim(self) -> str:
-        if self.limit is None:
-            return ""
-        return f"with these gains a violation has at most probability {self.limit:g}"
+    claimed: ClassVar[str] = "with these gains a violation has at most probability {limit:g}"
 
 
 def _experiment(asked: Tuning, setup: Setup) -> Experiment:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -41,10 +41,7 @@ class AskedWorstCase(Varied):
     shrink: Flag = Field(True, description="Whether a violation is reduced to few deviations.")
     python_control: Flag = Field(False, description="Whether python-control confirms it as well.")
     limit: Number | None = Field(None, description="Claim: no margin found is this low.")
-
-    @property
-    def claim(self) -> str:
-        return "" if self.limit is None else f"no margin of {self.limit:g} or lower is found"
+    claimed: ClassVar[str] = "no margin of {limit:g} or lower is found"
 
 
 def _run(asked: AskedWorstCase, ground: Ground) -> Finding:
