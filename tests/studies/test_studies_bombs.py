@@ -138,5 +138,5 @@ def test_a_sealed_file_of_a_run_that_is_nested_too_deeply_is_refused(tmp_path):
     plain = {"format": RUN_FORMAT, "deep": deep}
     key = hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
     (tmp_path / "run.json").write_text(json.dumps(plain | {"sha256": key}))
-    with pytest.raises(RunFolderError, match="damaged .it is nested too deeply."):
+    with pytest.raises(RunFolderError, match="it is nested too deeply"):
         read_json(tmp_path / "run.json")
