@@ -2,7 +2,7 @@
 
     python campaign/rival_gains.py
 
-They are `nlctl.analysis.paper.rivals.RIVAL_GAINS`.
+In three digits they are ``analysis/paper/rival-gains.csv``.
 """
 
 from __future__ import annotations

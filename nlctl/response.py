@@ -19,15 +19,7 @@ from .errors import AlgebraicLoopError, AuditError, CompileError, EngineWarning,
 from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
-from .responses.arguments import (
-    HOLDS,
-    RunArguments,
-    checked_params,
-    held,
-    input_array,
-    unified,
-    with_aliases,
-)
+from .responses import arguments
 from .responses.time_response import Response
 from .responses.watched import Watched, WatchedEvents, check_moves, watched_functions
 from .sliding.relay import SLIDING
@@ -195,7 +187,7 @@ def input_output_response(
     >>> round(float(response.outputs[-1]), 6)  # 1 - exp(-1)
     0.632121
     """
-    checked_params(params)
+    arguments.checked_params(params)
     tolerances("input_output_response", rtol, atol)
     if max_step is not None:
         number("input_output_response", "max_step", max_step, above=0)
@@ -205,10 +197,10 @@ def input_output_response(
         raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
     named |= {"evaluation_times": evaluation_times, "return_states": return_states}
-    named = with_aliases(named, aliases, input_output_response)
-    one_of("input_output_response", "hold", hold, HOLDS)
+    named = arguments.with_aliases(named, aliases, input_output_response)
+    one_of("input_output_response", "hold", hold, arguments.HOLDS)
     form = {"squeeze": squeeze, "transpose": transpose, "return_states": named["return_states"]}
-    run = RunArguments(
+    run = arguments.RunArguments(
         system=system,
         times=checked_times(named["timepts"]),
         inputs=named["inputs"],
@@ -227,24 +219,24 @@ def input_output_response(
         watched=watched_functions(stop_when, events),
         hold=hold,
     )
-    response = _computed(_held(unified(run)), "auto" if engine is None else engine)
+    response = _computed(_held(arguments.unified(run)), "auto" if engine is None else engine)
     if run.watched and response.success is not False:
         check_moves(run.watched, (response.t, response.x, response.u), params)
     return response
 
 
-def _held(run: RunArguments) -> RunArguments:
+def _held(run: arguments.RunArguments) -> arguments.RunArguments:
     """Return a run with the inputs of a zero-order hold as steps, in continuous time."""
     system = run.system.system if isinstance(run.system, StandIn) else run.system
     if run.hold == "foh" or not (is_system(system) and ct.isctime(system) and system.ninputs):
         return run
-    times, inputs = held(run.times, input_array(system, run.inputs, run.times))
+    times, inputs = arguments.held(run.times, arguments.input_array(system, run.inputs, run.times))
     evaluation = run.evaluation_times
     evaluation = run.times if isinstance(evaluation, str) and evaluation == "T" else evaluation
     return replace(run, times=times, inputs=inputs, evaluation_times=evaluation)
 
 
-def _computed(run: RunArguments, engine: str) -> Response:
+def _computed(run: arguments.RunArguments, engine: str) -> Response:
     interpretable = is_system(run.system)
     if not _takes_machine_code(run, engine, interpretable):
         for name in NATIVE_ONLY:
@@ -282,7 +274,7 @@ def _is_sampled(system: Any) -> bool:
     return any(sampling_of(leaf.system) is not None for leaf in leaves(system))
 
 
-def _takes_machine_code(run: RunArguments, engine: str, interpretable: bool) -> bool:
+def _takes_machine_code(run: arguments.RunArguments, engine: str, interpretable: bool) -> bool:
     if engine not in ENGINES:
         raise unknown("engine", str(engine), ENGINES)
     if not interpretable and engine == "python-control":
@@ -294,14 +286,14 @@ def _takes_machine_code(run: RunArguments, engine: str, interpretable: bool) -> 
     return engine == "auto" and not _asks_for_scipy(run)
 
 
-def _asks_for_scipy(run: RunArguments) -> bool:
+def _asks_for_scipy(run: arguments.RunArguments) -> bool:
     """Whether a run is given what only python-control's integrator knows."""
     method, keywords = run.solver["method"], run.solver["solve_ivp_kwargs"] or {}
     named = run.solver["solve_ivp_method"] is not None or method in SOLVE_IVP_METHODS
     return named or run.evaluation_times is None or bool(set(keywords) - {"rtol", "atol"})
 
 
-def _native(run: RunArguments) -> Response:
+def _native(run: arguments.RunArguments) -> Response:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
     from .native.diagram.checks import sized

@@ -16,7 +16,7 @@ from .studies import Trust, check_study_path, exit_code, exit_codes, run_folder
 from .written_page import PageOptions, check_report_options, finish_report
 
 if TYPE_CHECKING:
-    from ..studies.finding import Finding
+    from ..studies.result import Finding
 
 _KIND = "tuning"
 _EXAMPLE = """

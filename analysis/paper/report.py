@@ -24,7 +24,7 @@ from ..reproductions.cases import PaperRun, simulate_cases
 from ..reproductions.page import Composed, ProgressWatch, unwatched
 from ..robustness import prepare
 from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
-from ..robustness.runs.parquet import parquet
+from ..robustness.runs.store import parquet
 from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
 from . import evidence as proofs

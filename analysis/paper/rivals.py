@@ -7,6 +7,7 @@ the gains.
 
 from __future__ import annotations
 
+import csv
 import functools
 import json
 import math
@@ -132,62 +133,17 @@ _MAKERS: dict[str, Callable[[str, Mapping[str, float]], Any]] = {
     "funnel": _funnel,
 }
 
-RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
-    "example_1": {
-        "paper, tuned": {"law.beta": 49.3, "weights.Gamma": 25.0, "robust.gamma": 0.797},
-        "PID": {
-            "controller.k_p": 19.3,
-            "controller.k_i": 226.0,
-            "controller.k_d": 29.4,
-            "controller.T_f": 0.00501,
-        },
-        "sliding mode": {"law.K": 9.47, "law.phi": 0.0265},
-        "super-twisting": {"law.k_1": 26.6, "law.k_2": 92.9, "law.phi": 0.0112},
-        "dynamic surface": {
-            "surface.c[0]": 12.7,
-            "surface.c[1]": 16.4,
-            "surface.tau[0]": 0.493,
-            "weights.Gamma": 1.96,
-        },
-        "prescribed performance": {
-            "controller.k[0]": 1.57,
-            "controller.k[1]": 13.9,
-            "controller.rho_inf[0]": 0.173,
-            "controller.rho_inf[1]": 1.17,
-            "controller.decay[0]": 2.11,
-        },
-        "funnel": {"controller.k": 32.2, "controller.rho_inf": 0.0835, "controller.decay": 2.78},
-    },
-    "example_2": {
-        "paper, tuned": {"law.beta": 4.16, "weights.Gamma": 5.96, "robust.gamma": 0.148},
-        "PID": {
-            "controller.k_p": 0.658,
-            "controller.k_i": 0.0477,
-            "controller.k_d": 4.9,
-            "controller.T_f": 0.0102,
-        },
-        "sliding mode": {"law.K": 2.15, "law.phi": 0.0327},
-        "super-twisting": {"law.k_1": 1.77, "law.k_2": 1.51, "law.phi": 0.026},
-        "dynamic surface": {
-            "surface.c[0]": 0.773,
-            "surface.c[1]": 0.656,
-            "surface.c[2]": 9.55,
-            "surface.tau[0]": 0.186,
-            "surface.tau[1]": 0.264,
-            "weights.Gamma": 2.29,
-        },
-        "prescribed performance": {
-            "controller.k[0]": 0.501,
-            "controller.k[1]": 0.574,
-            "controller.k[2]": 2.78,
-            "controller.rho_inf[0]": 0.163,
-            "controller.rho_inf[1]": 0.308,
-            "controller.rho_inf[2]": 1.72,
-            "controller.decay[0]": 0.342,
-        },
-        "funnel": {"controller.k": 15.8, "controller.rho_inf": 0.245, "controller.decay": 2.44},
-    },
-}
+
+def _recorded_gains() -> dict[str, dict[str, dict[str, float]]]:
+    gains: dict[str, dict[str, dict[str, float]]] = {}
+    text = Path(__file__).with_name("rival-gains.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        by_label = gains.setdefault(row["example"], {})
+        by_label.setdefault(row["controller"], {})[row["gain"]] = float(row["value"])
+    return gains
+
+
+RIVAL_GAINS = _recorded_gains()
 """Gains by example and label, found by ``campaign/rival_gains.py``."""
 
 

@@ -3,18 +3,17 @@
 from .differences import origin_differences, run_differences
 from .file.asked import Asked, Varied
 from .file.errors import Problem, StudyError
-from .file.schema import Study
+from .file.schema import Study, to_toml
 from .file.shipped import shipped
-from .finding import Finding
 from .folder import load_result
 from .integrity import Integrity, verify
 from .kind import Ground, Kind, Setup, finding_of
 from .kinds import KINDS
 from .plan import Plan, plan
+from .reading.own_kinds import from_toml
 from .reading.parse import StudyFile, read_study
-from .reading.written import from_toml, to_toml
 from .replay import Replay, replay, replay_figure
-from .result import Result
+from .result import Finding, Result
 from .run import run
 from .sealed import RunFolderError
 

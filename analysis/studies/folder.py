@@ -28,27 +28,22 @@ from nlctl.host.files import replace_file
 from nlctl.wording import counted
 
 from ..robustness import Design, Space
-from ..robustness.runs.parquet import read_parquet
-from ..robustness.runs.store import opened
+from ..robustness.runs.store import opened, read_parquet
 from ..robustness.runs.sweep import Sweep, load
 from .build import labels, main_design
-from .code.record import study_digest
-from .code.rule import Grant
-from .file.schema import Study, keyed
+from .code.rule import Grant, Reach
+from .file.schema import Study, keyed, study_data
 from .file.toml import read_toml, study_text
-from .finding import Finding
 from .intact.contents import CONTENTS, check_intact
 from .intact.shapes import FindingFile, ResultsFile, RunFile, shaped
 from .kind import Kind
 from .origin import plain_study
-from .reading.own_kinds import STAND_IN, own_kinds, stand_ins
-from .reading.written import from_toml
+from .reading.own_kinds import STAND_IN, from_toml, own_kinds, stand_ins
 from .resolve import uncertain
-from .result import Result, described_tables
+from .result import Finding, Result, described_tables
 from .sealed import (
     ANEW,
     RunFolderError,
-    as_json,
     as_written,
     digest_of,
     file_bytes,
@@ -264,27 +259,20 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
                 f"'{folder / finding.key}' does not answer what its study asks ({asked.kind}"
                 f"{': ' * bool(claim)}{claim}): delete it and continue with --resume"
             )
-    if digest_of(as_json(result.plain())) != digest_of(as_json(content)):
+    if digest_of(result.plain()) != digest_of(content):
         raise RunFolderError(
             f"'{folder / 'results.json'}' does not say what the parts of the run say: continue "
             "with --resume, which makes it again"
         )
 
 
-def received(folder: Path, *, trust: bool = False) -> Grant:
-    """Return what code of a run folder may run: what this user has run or trusted, and nlctl's own.
-
-    The folder says where the code was, and nothing of who trusts it.
-    """
-    home = folder / load_run(folder)["study_folder"]
-    load_study(folder)
-    data = read_toml(study_text(file_bytes(folder / "study.toml")))
-    return Grant(reach="all" if trust else "nlctl", folder=home, study=study_digest(data))
-
-
 def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
     """Return the own kinds that the study of a run names, and notes on the others."""
-    kinds, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
+    # Their code may run if this user has run or trusted it, or it is nlctl's own: the folder says
+    # where the code was, and nothing of who trusts it.
+    data, home = study_data(load_study(folder)), folder / load_run(folder)["study_folder"]
+    reach: Reach = "all" if trust else "nlctl"
+    kinds, problems = own_kinds(data, Grant(reach=reach, folder=home, study=digest_of(data)))
     return kinds, [f"what it found is reported without its figures: {p}" for p in problems]
 
 

@@ -34,8 +34,7 @@ from ..robustness.runs.progress import Progress
 from ..robustness.runs.sweep import Sweep
 from .file.asked import Asked
 from .file.schema import Study
-from .finding import Finding
-from .result import Result
+from .result import Finding, Result
 
 if TYPE_CHECKING:
     from ..report.document import Item

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import pandas as pd
 
@@ -13,7 +14,6 @@ from ..robustness import Prepared, evaluate, independent, prepare
 from ..robustness.runs.experiment import columns_of
 from .build import main_design
 from .file.schema import keyed
-from .kind import Setup
 from .reading.parse import StudyFile
 
 _TIMED = 32
@@ -84,7 +84,7 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
     if study.runs is not None:
         runs["rows"] = main_design(study.runs, space, study.study.seed).size
         kept += runs["rows"]
-    setup = Setup(study=study, folder=file.folder, experiment=prepared.experiment)
+    setup = replace(file, experiment=prepared.experiment)
     for key, asked in keyed(study).items():
         count = asked.definition.planned(asked, setup)
         if count:

@@ -16,6 +16,7 @@ from nlctl.errors import ParameterError
 from nlctl.plotting.axes import BLUE, ORANGE, TIME, stacked_axes
 from nlctl.wording import counted
 
+from ..json_values import as_json
 from ..robustness import Experiment, Prepared, evaluate, prepare
 from ..robustness.runs.experiment import by_diagram, simulate_rows
 from ..robustness.stl.formula import Band, parts_of
@@ -23,7 +24,7 @@ from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
 from .reading.parse import StudyFile
 from .run import reopened
-from .sealed import RunFolderError, as_json, origin_key
+from .sealed import RunFolderError, origin_key
 
 _MOST = 8  # panels of a figure
 

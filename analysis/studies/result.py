@@ -1,4 +1,4 @@
-"""What a study has found: what a report is made of."""
+"""What a study and each of its analyses have found: what a report is made of."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from nlctl.host.notebook import table_html
 from nlctl.names import check_known
 from nlctl.wording import counted, some_of
 
+from ..json_values import as_json
 from ..robustness.runs.sweep import Sweep
 from .file.schema import Study, keyed
-from .finding import Finding
-from .sealed import as_json, origin_key
+from .sealed import origin_key
 
 LISTED = 400
 """Lines of a table that ``report.json`` holds as well; longer ones are files next to it."""
@@ -34,6 +34,47 @@ def described_tables(rows: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a study varies, requires and measures as tables, from the rows of each."""
     tables = {name: pd.DataFrame(rows[name], columns=names) for name, names in _COLUMNS.items()}
     return {name: table.set_index(table.columns[0]) for name, table in tables.items()}
+
+
+@described_record(eq=False, made_by="finding_of")
+class Finding:
+    """What one analysis found."""
+
+    key: str  # Name of its folder, kind of analysis, heading.
+    kind: str
+    title: str
+    sentence: str  # What was found, with what it rests on.
+    claim: str = ""  # What the study claimed; empty without a claim.
+    answer: str = ""  # What was found of the claim; empty without a claim.
+    needs: str = ""  # What it takes to show the claim, where it is not shown yet.
+    runs: int = 0  # Number of simulations that it rests on.
+    # Bounds, margins, rows: what the sentence says, as numbers and texts.
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)  # DataFrames by name.
+    # False where rows or loop did not admit the analysis: the sentence says why, and there are
+    # neither numbers nor tables.
+    is_answered: bool = True
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the claim is shown; None without a claim."""
+        return self.answer == "shown" if self.answer else None
+
+    @property
+    def outcome(self) -> str:
+        """The answer in words, ``not shown yet (needs ...)``."""
+        return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
+
+    def plain(self) -> dict[str, Any]:
+        """Return everything but the tables, as JSON can hold it.
+
+        Returns
+        -------
+        dict
+            Tables by their names only.
+        """
+        content = {key: value for key, value in vars(self).items() if key != "tables"}
+        return as_json(content) | {"tables": sorted(self.tables)}
 
 
 @described_record(eq=False, made_by="run")

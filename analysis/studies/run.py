@@ -17,15 +17,12 @@ from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
 from ..robustness import Design, Experiment, Prepared, evaluate, nominal, prepare
-from ..robustness.runs.parquet import parquet
 from ..robustness.runs.progress import Progress
-from ..robustness.runs.store import StoreError, locked
+from ..robustness.runs.store import StoreError, locked, parquet
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
-from .code.record import study_digest
 from .code.rule import remember_code
-from .file.schema import Study, keyed, study_data
-from .finding import Finding
+from .file.schema import Study, keyed, study_data, to_toml
 from .folder import checked, load_finding, load_run, load_study, save_finding
 from .intact.contents import seal, unseal
 from .kind import Ground, Setup, headed, unanswered
@@ -37,9 +34,8 @@ from .origin import (
     version_differences,
 )
 from .reading.parse import StudyFile, read_study
-from .reading.written import to_toml
-from .result import Result, described_tables
-from .sealed import RunFolderError, origin_key, write_json
+from .result import Finding, Result, described_tables
+from .sealed import RunFolderError, digest_of, origin_key, write_json
 
 # what `locked` makes, and a killed run leaves
 _OWN = (".lock", ".owner", "..owner.", ".study.toml.")
@@ -153,7 +149,7 @@ def run(
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
         origin = _stamped(file, prepared, folder)
-        remember_code(file.study, study_digest(study_data(file.study)), file.folder)
+        remember_code(file.study, digest_of(study_data(file.study)), file.folder)
         going = _Run(
             file=file,
             folder=folder,

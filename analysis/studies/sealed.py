@@ -47,13 +47,17 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
     """Read a file of a run folder that `write_json` has written."""
     try:
         content = json.loads(file_bytes(path))
+        is_sealed = isinstance(content, dict) and content.pop(SEAL, None) == digest_of(content)
+        values = from_json(content)
     except FileNotFoundError:
         raise RunFolderError(
             f"'{path.parent}' holds no run of a study, or one that has not come so far: there is "
             f"no '{path.name}'"
         ) from None
     except (OSError, ValueError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not JSON"
+        is_deep = isinstance(error, RecursionError)
+        mistake = "it is nested too deeply" if is_deep else "it is not JSON"
+        reason = error.strerror if isinstance(error, OSError) else mistake
         raise RunFolderError(f"'{path}' is damaged ({reason}): {remedy}") from error
     if not isinstance(content, dict):
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
@@ -63,10 +67,10 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
             f"'{path}' has the format {written_format!a}, and this nlctl reads {RUN_FORMAT}: read "
             "it with the nlctl that wrote it, or run the study again in another folder with --out"
         )
-    if content.pop(SEAL, None) != digest_of(content):
+    if not is_sealed:
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
-    del content["format"]
-    return from_json(content)
+    del values["format"]
+    return values
 
 
 def file_bytes(path: Path) -> bytes:
@@ -97,8 +101,8 @@ def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
 
 
 def digest_of(content: object) -> str:
-    """Return a key of what `as_json` has returned."""
-    text = json.dumps(content, sort_keys=True, ensure_ascii=True, allow_nan=False)
+    """Return a key of what JSON can hold of a content."""
+    text = json.dumps(as_json(content), sort_keys=True, ensure_ascii=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -112,4 +116,4 @@ def file_digest(path: Path) -> str:
 
 def origin_key(origin: Mapping[str, Any]) -> str:
     """Return a key of what `origin.origin_of` returns, without values, which rounding changes."""
-    return digest_of(as_json({key: part for key, part in origin.items() if key != "values"}))
+    return digest_of({key: part for key, part in origin.items() if key != "values"})

@@ -11,15 +11,8 @@ from .. import native
 from ..annotations import as_annotated
 from ..diagrams import initial_state as state_of
 from ..native.floats import with_every_float
+from . import words
 from .records import ExportedEquations
-from .words import (
-    c_name,
-    check_integers,
-    check_written_out,
-    digest,
-    parameter_values,
-    refuse_if_any,
-)
 
 
 @as_annotated
@@ -68,22 +61,22 @@ def export_equations(
     what = str(diagram.name)
     _check_continuous(compiled, what)
     p = compiled.parameter_vector(params)
-    check_written_out(compiled, what, p)
-    check_integers(compiled, p, what)
-    values, start = parameter_values(compiled, p), state_of(diagram, initial_state)
+    words.check_written_out(compiled, what, p)
+    words.check_integers(compiled, p, what)
+    values, start = words.parameter_values(compiled, p), state_of(diagram, initial_state)
     labels, lowered = tuple(compiled.state_labels or ()), compiled.lowered
     return ExportedEquations(
-        name=c_name(name, what), inputs=tuple(diagram.input_labels or ()),
+        name=words.c_name(name, what), inputs=tuple(diagram.input_labels or ()),
         outputs=tuple(diagram.output_labels or ()), states=labels,
         memory=tuple(labels[i] for i in compiled.program.memory), conditions=lowered.rows["g"],
         parameters=values, initial_state=start, lowered=lowered,
-        digest=digest(lowered.text, values, start),
+        digest=words.digest(lowered.text, values, start),
     )  # fmt: skip
 
 
 def _check_continuous(compiled: native.Compiled, what: str) -> None:
     """Refuse what three functions cannot say."""
-    refuse_if_any(what, {
+    words.refuse_if_any(what, {
         "is in discrete time": not ct.isctime(compiled),
         "has sampled blocks: export each with its block": bool(compiled.program.clocks),
         "has resets": bool(compiled.program.guards),

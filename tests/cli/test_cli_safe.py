@@ -136,7 +136,7 @@ def test_few_threads_of_others_read_a_folder(done):
     script = (
         "import sys, threading, pathlib\n"
         "from nlctl.analysis.studies import load_result\n"
-        "from nlctl.analysis.robustness.runs.parquet import read_parquet\n"
+        "from nlctl.analysis.robustness.runs.store import read_parquet\n"
         "import pyarrow.parquet, pandas\n"
         "count = lambda: len(list(pathlib.Path('/proc/self/task').iterdir()))\n"
         "before = count()\n"

@@ -118,7 +118,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
     ],
     "nlctl.analysis.studies": [
         ["sealed", "file"],
-        ["code", "finding"],
+        ["code"],
         ["result"],
         ["kind", "page"],
         ["resolve"],

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 from fontTools.ttLib import TTFont
+from math_font import CHARACTERS, italic, subset
 from rows import each_row
 
 import nlctl
@@ -15,13 +16,10 @@ from nlctl.analysis.paper.page import text as text
 from nlctl.analysis.report import Equation
 from nlctl.analysis.report.mathml import (
     ATTRIBUTES,
-    CHARACTERS,
     ELEMENTS,
     FAMILY,
     font_face,
-    italic,
     mathml,
-    subset,
 )
 
 EXAMPLES = (nlctl.paper.example_1(), nlctl.paper.example_2())

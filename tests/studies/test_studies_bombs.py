@@ -1,13 +1,17 @@
 """Whatever stands in a study file, it is read or refused in a sentence at once."""
 
+import functools
+import hashlib
+import json
 import time
 
 import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from nlctl.analysis.studies.file.errors import line_numbers
-from nlctl.analysis.studies.file.toml import DEEPEST, statements
+from nlctl.analysis.studies import RunFolderError
+from nlctl.analysis.studies.file.toml import DEEPEST, line_numbers, statements
+from nlctl.analysis.studies.sealed import RUN_FORMAT, read_json
 
 DOTS = ".".join(["a"] * 3000)
 MANY = ", ".join(f"o{i} = {i}" for i in range(10))
@@ -126,3 +130,13 @@ g = { h = ["}"] }'''
     assert numbers["table", "x]y", "d"] == 9
     assert numbers["list", 0, "g"] == 15
     assert DEEPEST >= 10
+
+
+def test_a_sealed_file_of_a_run_that_is_nested_too_deeply_is_refused(tmp_path):
+    """Whoever sends a folder can seal it: what Python cannot follow ends in one sentence."""
+    deep = functools.reduce(lambda inner, _: [inner], range(700), 1)
+    plain = {"format": RUN_FORMAT, "deep": deep}
+    key = hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
+    (tmp_path / "run.json").write_text(json.dumps(plain | {"sha256": key}))
+    with pytest.raises(RunFolderError, match="it is nested too deeply"):
+        read_json(tmp_path / "run.json")

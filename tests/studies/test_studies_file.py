@@ -10,8 +10,9 @@ from studies_example import HEAD, ROWS, write
 from nlctl import paper
 from nlctl.analysis.robustness import nominal, resolved
 from nlctl.analysis.studies import StudyError, from_toml, read_study, to_toml
-from nlctl.analysis.studies.file.errors import line_numbers, place_text
+from nlctl.analysis.studies.file.errors import place_text
 from nlctl.analysis.studies.file.schema import keyed
+from nlctl.analysis.studies.file.toml import line_numbers
 from nlctl.analysis.studies.reading.own_kinds import model_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown

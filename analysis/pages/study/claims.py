@@ -11,9 +11,8 @@ from ...report.document import Claim, Section, Table
 from ...robustness.statistics.guarantee import check_iid
 from ...studies.file.asked import Asked
 from ...studies.file.schema import keyed
-from ...studies.finding import Finding
 from ...studies.page.text import without_assumptions
-from ...studies.result import Result
+from ...studies.result import Finding, Result
 
 AT_ONCE = 2
 """So many findings are in the verdict where nothing is claimed."""

@@ -13,12 +13,11 @@ from ...report.document import Figure, Paragraph, Report, Section, Table, versio
 from ...report.outline import summary
 from ...report.render import file_hashes
 from ...studies.file.asked import Varied
-from ...studies.finding import Finding
 from ...studies.kinds import KINDS
 from ...studies.page.running import running
 from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
 from ...studies.reading.own_kinds import STAND_IN
-from ...studies.result import LISTED, Result
+from ...studies.result import LISTED, Finding, Result
 from ...studies.sealed import as_written
 from . import methods as how
 from . import text as text

@@ -1,11 +1,10 @@
-"""Chunks of a design: computed here, or by any executor of `concurrent.futures`."""
+"""Chunks of a design, computed by any executor of `concurrent.futures`."""
 
 from __future__ import annotations
 
 import multiprocessing
 import signal
 import threading
-import time
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -17,19 +16,17 @@ from concurrent.futures import (
 )
 from dataclasses import replace
 from functools import lru_cache
-from itertools import islice, takewhile
+from itertools import islice
 from typing import Any
 
 import cloudpickle
-import numpy as np
 import pandas as pd
 
-from nlctl.errors import UsageError
 from nlctl.host.workers import end_with_parent
 from nlctl.native.ensemble import cores
 
-from ..uncertainty.design import Design, rows, seed_number
-from .experiment import Prepared, columns_of, evaluate, typed
+from ..uncertainty.design import Design, rows
+from .experiment import Prepared, chunk_table
 
 _LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
 Chunk = tuple[range, pd.DataFrame]
@@ -37,45 +34,6 @@ Chunk = tuple[range, pd.DataFrame]
 
 class LostChunkError(RuntimeError):
     """A worker ended without returning its chunk; the message says which rows are missing."""
-
-
-def chunk_table(
-    prepared: Prepared,
-    design: Design,
-    numbers: range,
-    *,
-    points: pd.DataFrame | None = None,
-    threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> pd.DataFrame:
-    """Run some rows of a design."""
-    # A pure function, except for the column ``wall_time``. `points` are these rows of a listed
-    # design that was sent without them.
-    start = time.perf_counter()
-    table = rows(design, numbers) if points is None else points
-    try:
-        results = evaluate(prepared, table, threads=threads, progress=progress)
-    except UsageError as error:
-        raise type(error)(f"{error} (in rows {numbers[0]} to {numbers[-1]})") from error
-    if len(results) < len(numbers):
-        raise KeyboardInterrupt
-    seeds = np.array([seed_number(design, number) for number in numbers], dtype=np.uint64)
-    spent = (time.perf_counter() - start) / max(len(numbers), 1)
-    return typed(results.assign(seed=seeds, wall_time=spent), columns_of(prepared))
-
-
-def computed_here(
-    prepared: Prepared,
-    design: Design,
-    chunks: Iterable[range],
-    wants_more: Callable[[], bool],
-    *,
-    threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> Generator[Chunk, None, None]:
-    """Yield chunk after chunk, until no more are wanted."""
-    for numbers in takewhile(lambda _: wants_more(), chunks):
-        yield numbers, chunk_table(prepared, design, numbers, threads=threads, progress=progress)
 
 
 def computed_elsewhere(
@@ -155,7 +113,8 @@ def _worked(
         # Ctrl-C reaches all processes of a terminal; the parent decides what is finished
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     prepared, design = _unpacked(payload)
-    return chunk_table(prepared, design, numbers, points=points, threads=threads)
+    chosen = rows(design, numbers) if points is None else points
+    return chunk_table(prepared, design, chosen, threads=threads)
 
 
 def _workers(executor: Executor) -> int:

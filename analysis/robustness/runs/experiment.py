@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -15,7 +16,7 @@ from nlctl import native
 from nlctl.annotations import as_annotated
 from nlctl.arguments import ATOL, RTOL, a_function, of_type
 from nlctl.attributes import described_record
-from nlctl.errors import ParameterError
+from nlctl.errors import ParameterError, UsageError
 from nlctl.names import check_known
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
@@ -28,6 +29,7 @@ from ...metrics import Metric, in_machine_code
 from ..stl.piecewise import with_vertices
 from ..stl.spec import Requirement, Spec, unfinished_margin
 from ..uncertainty.binding import diagrams, resolved
+from ..uncertainty.design import Design, seed_number
 from ..uncertainty.space import Space, arguments, arguments_of_row, checked_rows
 
 
@@ -360,3 +362,25 @@ def typed(frame: pd.DataFrame, columns: Columns) -> pd.DataFrame:
         if name in frame
     }
     return frame.filter(list(types)).astype(types)
+
+
+def chunk_table(
+    prepared: Prepared,
+    design: Design,
+    chosen: pd.DataFrame,
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> pd.DataFrame:
+    """Run some rows of a design, as `design.rows` has them."""
+    # A pure function, except for the column ``wall_time``.
+    start, numbers = time.perf_counter(), chosen.index
+    try:
+        results = evaluate(prepared, chosen, threads=threads, progress=progress)
+    except UsageError as error:
+        raise type(error)(f"{error} (in rows {numbers[0]} to {numbers[-1]})") from error
+    if len(results) < len(numbers):
+        raise KeyboardInterrupt
+    seeds = np.array([seed_number(design, number) for number in numbers], dtype=np.uint64)
+    spent = (time.perf_counter() - start) / max(len(numbers), 1)
+    return typed(results.assign(seed=seeds, wall_time=spent), columns_of(prepared))

@@ -33,7 +33,7 @@ COMPUTING = {
         "loop_record.py",
     ),
 }
-TOLD = ("drawing", "page", "analysis")  # they compute nothing; what does of the last is listed
+TOLD = ("drawing", "analysis")  # they compute nothing; what does of the last is listed
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 
 

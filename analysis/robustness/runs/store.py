@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,13 +32,32 @@ from nlctl.wording import some_of
 from ...loop_record import text_key
 from .experiment import Columns, typed
 from .identity import differences_of
-from .parquet import parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 CHUNKS_FORMAT = 2
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
+
+
+def parquet() -> ModuleType:
+    """Return ``pyarrow.parquet``; say what to install where it is missing."""
+    try:
+        import pyarrow.parquet
+    except ImportError:
+        raise UsageError(
+            "runs that are kept in a folder need pyarrow, for tables in Parquet: "
+            'pip install "nlctl[studies]"'
+        ) from None
+    return pyarrow.parquet
+
+
+def read_parquet(path: Path) -> pd.DataFrame:
+    """Read a table that `DataFrame.to_parquet` has written, without threads."""
+    # Those of pyarrow's datasets, which `read_table` begins, wait for ever where memory is too
+    # short to begin others.
+    with parquet().ParquetFile(path) as file:
+        return file.read(use_threads=False).to_pandas(use_threads=False)
 
 
 class StoreError(UsageError):

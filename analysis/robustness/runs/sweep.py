@@ -6,11 +6,12 @@ import math
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,9 @@ from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import check_known
 
-from ..uncertainty.design import Design
-from .executors import LostChunkError, chunk_table, computed_elsewhere, computed_here
-from .experiment import Prepared, columns_of
+from ..uncertainty.design import Design, rows
+from .executors import Chunk, LostChunkError, computed_elsewhere
+from .experiment import Prepared, chunk_table, columns_of
 from .identity import identity_of
 from .progress import Progress, Tally
 from .store import ChunkStore, claimed, opened, put, stored, table_of, taken_up
@@ -228,9 +229,7 @@ def sweep(
         run = _Run(tally=tally, interrupt=interrupt, progress=progress, stop=stop)
         todo = tally.missing(chunk)
         chunks = (
-            computed_here(
-                prepared, design, todo, run.wants_more, threads=threads, progress=run.report
-            )
+            _computed_here(prepared, design, todo, run, threads)
             if executor is None
             else computed_elsewhere(
                 executor, prepared, design, todo, run.wants_more, threads=threads
@@ -239,7 +238,7 @@ def sweep(
         notes += run.through(stack.enter_context(closing(chunks)), keep)
     held = None
     if folder is None:
-        frames = frames or [chunk_table(prepared, design, range(0))]
+        frames = frames or [chunk_table(prepared, design, rows(design, range(0)))]
         held = pd.concat(frames).sort_index()
     return Sweep(
         design=design,
@@ -307,9 +306,7 @@ class _Run:
         if self.stop is not None and not self.decided:
             self.decided = self.stop(self.tally.progress()) or None
 
-    def through(
-        self, chunks: Iterator[tuple[range, pd.DataFrame]], keep: Callable[[pd.DataFrame], object]
-    ) -> list[str]:
+    def through(self, chunks: Iterator[Chunk], keep: Callable[[pd.DataFrame], object]) -> list[str]:
         """Keep and count all chunks; return what went wrong."""
         self.consider()
         try:
@@ -322,6 +319,19 @@ class _Run:
         except KeyboardInterrupt:
             self.interrupt.asked = True
         return []
+
+
+def _computed_here(
+    prepared: Prepared, design: Design, chunks: Iterable[range], run: _Run, threads: int | None
+) -> Generator[Chunk, None, None]:
+    """Yield chunk after chunk, until no more are wanted."""
+    for numbers in takewhile(lambda _: run.wants_more(), chunks):
+        yield (
+            numbers,
+            chunk_table(
+                prepared, design, rows(design, numbers), threads=threads, progress=run.report
+            ),
+        )
 
 
 class Interrupt:

@@ -11,8 +11,7 @@ import pandas as pd
 from nlctl.arguments import a_function
 from nlctl.errors import ParameterError
 
-from ..uncertainty.quantity import Uncertain
-from ..uncertainty.space import Space, moved, nominal
+from ..uncertainty.space import Space, towards_nominal
 
 # takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
 # ``functools.partial(evaluate, prepared)``
@@ -55,21 +54,6 @@ def as_table(space: Space, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 def margins_at(evaluate: Evaluate, space: Space, rows: Iterable[Mapping[str, Any]]) -> np.ndarray:
     """Evaluate rows given as ``{name: value}``, return their margins."""
     return margins_of(evaluated(evaluate, as_table(space, rows)))
-
-
-def towards_nominal(
-    space: Space, row: Mapping[str, Any], factor: float, names: Collection[str] | None = None
-) -> _Row:
-    """Return the row with the deviations of numbers from nominal multiplied by `factor`."""
-    middle = nominal(space)
-
-    def nearer(quantity: Uncertain) -> float:
-        value = moved(middle[quantity.name], row[quantity.name], factor)
-        return float(np.rint(value)) if quantity.is_integer else float(value)
-
-    return dict(row) | {
-        q.name: nearer(q) for q in space.quantities if names is None or q.name in names
-    }
 
 
 def nearest_violation(

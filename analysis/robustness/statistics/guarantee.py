@@ -80,6 +80,16 @@ class Violation:
         text = f"{text} {first}"
         return text + "".join(f"; with the same confidence, {other} {both}" for other in rest)
 
+    def plain(self) -> dict[str, Any]:
+        """Return it as numbers and texts, as JSON can hold them.
+
+        Returns
+        -------
+        dict
+            The fields by their names.
+        """
+        return vars(self) | {"assumptions": list(self.assumptions)}
+
 
 def rounded_up(value: float) -> str:
     """Return an upper bound in four digits, rounded up so that it holds as printed."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -22,7 +23,9 @@ from nlctl.params import with_overrides
 from nlctl.upstream.control_internals import is_system
 
 from .quantity import SpaceError, Uncertain
-from .space import Space, combinations
+from .space import Space, combinations, ends, nominal, towards_nominal
+
+FEW = 10  # of up to so many quantities of one block all corners are tried
 
 
 @as_annotated
@@ -190,3 +193,56 @@ def diagrams(
 
 def _text(labels: Mapping[str, str]) -> str:
     return ", ".join(f"{name} = {label}" for name, label in labels.items()) or "the diagram"
+
+
+def refusal_of(space: Space, systems: Iterable[ct.InputOutputSystem]) -> str:
+    """Return why a block refuses values of the boxes that each by itself are admissible, or ""."""
+    return next(filter(None, (one(1.0) for one in refusals(space, systems, space.names))), "")
+
+
+def refusals(
+    space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
+) -> Iterator[Callable[[float], str]]:
+    """Yield for each corner what says for a factor why its block refuses it, or nothing."""
+    # Blocks are those with parameters that are uncertain; of these `names` may be scaled.
+    middle = nominal(space)
+    for system in systems:
+        blocks, fields = {}, {}
+        for quantity in space.quantities:
+            owner = None if quantity.is_initial else owner_of(system, quantity.name)
+            if owner is not None:  # a third-party block takes what it is given
+                block, key = owner
+                path = base_name(quantity.name).rpartition(".")[0]
+                blocks[path] = block
+                fields.setdefault(path, {})[quantity.name] = key
+        for path, keys in fields.items():
+            given = {key: middle[name] for name, key in keys.items()}
+            record = with_overrides(blocks[path].current_spec, given, path)
+            for corner in _corners(space, [name for name in keys if name in names]):
+                yield partial(_refusal, space, record, path, keys, corner)
+
+
+def _refusal(
+    space: Space,
+    record: object,
+    path: str,
+    keys: Mapping[str, str],
+    corner: Mapping[str, Any],
+    factor: float,
+) -> str:
+    """Return why a block refuses a corner moved by a factor from nominal, or nothing."""
+    row = towards_nominal(space, corner, factor, corner)
+    try:
+        with_overrides(record, {keys[name]: row[name] for name in row}, path)
+    except ParameterError as error:
+        return str(error)
+    return ""
+
+
+def _corners(space: Space, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield what is tried of some quantities: those that are not nominal, each at an end."""
+    values = ends(space).to_dict("list")
+    sizes = [len(names)] if len(names) <= FEW else [1, 2]
+    for group in itertools.chain(*(itertools.combinations(names, size) for size in sizes)):
+        for corner in itertools.product(*(values[name] for name in group)):
+            yield dict(zip(group, corner, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -145,6 +145,21 @@ def scaled(space: Space, factor: float) -> Space:
 def moved(middle: float, value: Any, factor: float) -> Any:
     """Return a number or array with its distance to the nominal value, `middle`, multiplied."""
     return middle + factor * (value - middle)
+
+
+def towards_nominal(
+    space: Space, row: Mapping[str, Any], factor: float, names: Collection[str] | None = None
+) -> dict[str, Any]:
+    """Return the row with the deviations of numbers from nominal multiplied by `factor`."""
+    middle = nominal(space)
+
+    def nearer(quantity: Uncertain) -> float:
+        value = moved(middle[quantity.name], row[quantity.name], factor)
+        return float(np.rint(value)) if quantity.is_integer else float(value)
+
+    return dict(row) | {
+        q.name: nearer(q) for q in space.quantities if names is None or q.name in names
+    }
 
 
 def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:

@@ -10,15 +10,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import platformdirs
 
 from nlctl.host.files import replace_file
-
-from ...json_values import as_json
 
 _FORMAT = 1
 
@@ -27,12 +24,6 @@ def record_file() -> Path:
     """Return where the record is: in NLCTL_CONFIG_DIR, or the user's configuration."""
     folder = os.environ.get("NLCTL_CONFIG_DIR") or platformdirs.user_config_dir("nlctl")
     return Path(folder) / "trusted.json"
-
-
-def study_digest(data: Mapping[str, Any]) -> str:
-    """Return a key of the content of a study file."""
-    text = json.dumps(as_json(data), sort_keys=True, ensure_ascii=True)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def statement(study: str, name: str, content: bytes) -> str:

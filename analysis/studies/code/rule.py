@@ -39,8 +39,9 @@ from nlctl.expressions.source import codes_in
 from nlctl.host.former_name import present_name
 from nlctl.native.purity.captured import in_cell
 
-from ..file.errors import KeyPath, Problem
+from ..file.errors import Problem
 from ..file.schema import Study
+from ..file.toml import KeyPath
 from .loading import loaded_with
 from .record import remember, remembered, statement
 
@@ -86,7 +87,7 @@ class Grant:
 
     reach: Reach
     folder: Path  # what paths in the study are relative to
-    study: str  # a key of the study, see `record.study_digest`
+    study: str  # a key of the study, see `sealed.digest_of`
 
     def admits(self, path: Path) -> str:
         """Return why a file may not be run; nothing if it may."""

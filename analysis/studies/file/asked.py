@@ -43,9 +43,7 @@ class Asked(Strict):
     >>> class Spread(Asked):
     ...     of: str = Field("spec", description="Column of the main table.")
     ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
-    ...     @property
-    ...     def claim(self):
-    ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
+    ...     claimed: ClassVar[str] = "the spread is at most {limit:g}"
     >>> Spread(kind="spread", limit=0.5).claim
     'the spread is at most 0.5'
     >>> Spread(kind="spread", limit=-1.0)
@@ -67,11 +65,14 @@ class Asked(Strict):
     kind: str
     definition: ClassVar[Any] = None
     """The `Kind` of the table, once a file has named it."""
+    claimed: ClassVar[str] = ""
+    """What it claims with a key ``limit`` that is given, with keys of the table in braces."""
 
     @property
     def claim(self) -> str:
         """What the study claims by asking for it; empty if it asks and claims nothing."""
-        return ""
+        is_given = getattr(self, "limit", None) is not None
+        return self.claimed.format_map(vars(self)) if is_given else ""
 
 
 class Varied(Asked):

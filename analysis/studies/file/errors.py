@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, get_args
@@ -13,9 +12,8 @@ from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 from nlctl.names import unknown
 
-from .toml import statements
+from .toml import KeyPath, nearest_line
 
-KeyPath = tuple[str | int, ...]
 _LONGEST = 600  # characters of a mistake
 OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"
 _LARGEST = 10**40  # integers beyond are not printed
@@ -98,53 +96,6 @@ def place_text(place: KeyPath) -> str:
             name = part if plain.isascii() and plain.isalnum() else f'"{part}"'
             text += f".{name}" if text else name
     return text or "the file"
-
-
-def line_numbers(text: str) -> dict[KeyPath, int]:
-    """Return the line of every key that a statement of a TOML file begins with."""
-    lines: dict[KeyPath, int] = {}
-    counts: dict[KeyPath, int] = {}
-    table: KeyPath = ()
-    for line, statement in statements(text):
-        path = _path(_parsed(statement))
-        if statement.startswith("["):
-            if statement.startswith("[["):
-                counts[path] = counts.get(path, -1) + 1
-            path = table = _indexed(path, counts)
-        else:
-            path = (*table, *path)
-        for depth in range(1, len(path) + 1):
-            lines.setdefault(path[:depth], line + 1)
-    return lines
-
-
-def _indexed(path: KeyPath, counts: Mapping[KeyPath, int]) -> KeyPath:
-    """Put in the index of the list entry that a header belongs to."""
-    place: list[str | int] = []
-    for depth, part in enumerate(path, 1):
-        place.append(part)
-        if path[:depth] in counts:
-            place.append(counts[path[:depth]])
-    return tuple(place)
-
-
-def _parsed(statement: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(statement)
-    except tomllib.TOMLDecodeError:  # a comment
-        return {}
-
-
-def _path(statement: object) -> KeyPath:
-    """Return the dotted key of a statement; a value that is a table ends it as well."""
-    path: list[str | int] = []
-    while isinstance(statement, dict | list) and len(statement) == 1:
-        if isinstance(statement, list):
-            statement = statement[0]
-            continue
-        ((key, statement),) = statement.items()
-        path.append(key)
-    return tuple(path)
 
 
 def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -> list[Problem]:
@@ -247,11 +198,3 @@ def located(
         return replace(problem, settings=responsible)
     inside = tuple(text for at, text in settings.items() if at[: len(place)] == place)
     return replace(problem, line=nearest_line(lines, place), settings=inside if place else ())
-
-
-def nearest_line(lines: Mapping[KeyPath, int], place: KeyPath) -> int | None:
-    """Return the line of a place, or of the innermost table around it that has one."""
-    for depth in range(len(place), 0, -1):
-        if place[:depth] in lines:
-            return lines[place[:depth]]
-    return None

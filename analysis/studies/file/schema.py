@@ -6,8 +6,10 @@ import itertools
 import re
 from typing import Annotated, Any, Literal
 
+import tomli_w
 from pydantic import BeforeValidator, Field, SerializeAsAny
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import ATOL, RTOL
 
 from .asked import Asked, Id, Number, Pair, Size, Strict, Whole
@@ -158,6 +160,35 @@ class Study(Strict):
 def study_data(study: Study) -> dict[str, Any]:
     """Return the data of a file with this study; what is left to defaults is left out."""
     return study.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+
+
+@as_annotated
+def to_toml(study: Study) -> str:
+    """Return the text of a study file with this study; what is left to defaults is left out.
+
+    Parameters
+    ----------
+    study : Study
+        What is written.
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.studies import from_toml, shipped, to_toml
+    >>> study = from_toml(shipped("example-1-quick").read_text(encoding="utf-8"))
+    >>> text = to_toml(study)
+    >>> from_toml(text) == study
+    True
+    >>> print(text[text.index("[time]"):].split("[metrics]")[0].strip())
+    [time]
+    end = 20.0
+    step = 0.01
+    """
+    return tomli_w.dumps(study_data(study))
 
 
 def keyed(study: Study) -> dict[str, Any]:

@@ -1,12 +1,13 @@
-"""TOML within limits: whatever a file holds is read or refused at once."""
+"""TOML within limits: whatever a file holds is read or refused at once; the line of every key."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+KeyPath = tuple[str | int, ...]
 _LARGEST = 200_000  # characters of a file
 _LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
 DEEPEST = 20  # tables and lists inside of each other
@@ -99,3 +100,58 @@ def statements(text: str) -> Iterator[tuple[int, str]]:
         line += word.count("\n")
     if statement := text[start:].strip():
         yield first, statement
+
+
+def line_numbers(text: str) -> dict[KeyPath, int]:
+    """Return the line of every key that a statement of a TOML file begins with."""
+    lines: dict[KeyPath, int] = {}
+    counts: dict[KeyPath, int] = {}
+    table: KeyPath = ()
+    for line, statement in statements(text):
+        path = _path(_parsed(statement))
+        if statement.startswith("["):
+            if statement.startswith("[["):
+                counts[path] = counts.get(path, -1) + 1
+            path = table = _indexed(path, counts)
+        else:
+            path = (*table, *path)
+        for depth in range(1, len(path) + 1):
+            lines.setdefault(path[:depth], line + 1)
+    return lines
+
+
+def _indexed(path: KeyPath, counts: Mapping[KeyPath, int]) -> KeyPath:
+    """Put in the index of the list entry that a header belongs to."""
+    place: list[str | int] = []
+    for depth, part in enumerate(path, 1):
+        place.append(part)
+        if path[:depth] in counts:
+            place.append(counts[path[:depth]])
+    return tuple(place)
+
+
+def _parsed(statement: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(statement)
+    except tomllib.TOMLDecodeError:  # a comment
+        return {}
+
+
+def _path(statement: object) -> KeyPath:
+    """Return the dotted key of a statement; a value that is a table ends it as well."""
+    path: list[str | int] = []
+    while isinstance(statement, dict | list) and len(statement) == 1:
+        if isinstance(statement, list):
+            statement = statement[0]
+            continue
+        ((key, statement),) = statement.items()
+        path.append(key)
+    return tuple(path)
+
+
+def nearest_line(lines: Mapping[KeyPath, int], place: KeyPath) -> int | None:
+    """Return the line of a place, or of the innermost table around it that has one."""
+    for depth in range(len(place), 0, -1):
+        if place[:depth] in lines:
+            return lines[place[:depth]]
+    return None

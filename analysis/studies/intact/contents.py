@@ -16,8 +16,7 @@ from typing import Any
 
 from nlctl.wording import counted
 
-from ...robustness.runs.parquet import parquet
-from ...robustness.runs.store import locked
+from ...robustness.runs.store import locked, parquet
 from ..file.schema import keyed
 from ..result import Result
 from ..sealed import RunFolderError, file_digest, write_json

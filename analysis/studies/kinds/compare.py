@@ -32,12 +32,11 @@ from ...robustness.statistics.verdict import better_verdict
 from ..build import choice, inputs_of, metrics_of
 from ..file.asked import Asked, Confidence, Names, Whole
 from ..file.schema import Choices
-from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..resolve import option
-from ..result import Result
+from ..result import Finding, Result
 from .context import CLOPPER, HOLM
 
 MOST_PAIRS = 30  # rows of a table of pairs; of more, only those with the first option are shown

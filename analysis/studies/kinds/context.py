@@ -1,4 +1,4 @@
-"""What several kinds of analysis share: numbers of a statement, a response, sources."""
+"""What several kinds of analysis share: a response, and sources."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from nlctl.errors import ParameterError
 from nlctl.native import Status
 from nlctl.wording import some_of
 
-from ...robustness import Violation
 from ...robustness.runs.sweep import Sweep
 from ...robustness.statistics.sensitivity import censored
 from ..kind import Ground, column
@@ -43,11 +42,6 @@ SEARCHED = (
     "a portfolio of corners of the box, uniform draws and CMA-ES with restarts and growing "
     "populations on the margin (Hansen 2016; Auger and Hansen 2005)"
 )
-
-
-def statement_numbers(statement: Violation) -> dict[str, Any]:
-    """Return a statement about a probability as numbers and texts."""
-    return vars(statement) | {"assumptions": list(statement.assumptions)}
 
 
 def response(of: str, ground: Ground, done: Sweep) -> tuple[np.ndarray, str, dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import ClassVar
 
 from pydantic import Field, model_validator
 
@@ -14,11 +15,10 @@ from ...robustness import bound_verdict, independent
 from ...robustness.search.degradation import degradation_curve
 from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
 from ..file.asked import Confidence, Flag, Size, Varied, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.text import margin_text
-from ..result import Result
+from ..result import Finding, Result
 from .context import CLOPPER
 
 _CAPTION = (
@@ -36,18 +36,13 @@ class AskedDegradation(Varied):
     simultaneous: Flag = Field(False, description="Whether all intervals hold together.")
     at: Size = Field(1.0, description="The size that the claim is about, one of the factors.")
     limit: Confidence | None = Field(None, description="Claim: the upper bound at that size.")
+    claimed: ClassVar[str] = "a violation has at most probability {limit:g} at the size {at:g}"
 
     @model_validator(mode="after")
     def _at_is_looked_at(self) -> AskedDegradation:
         if self.limit is not None and self.at not in self.factors:
             raise ValueError(f"the claim is about size {self.at:g}, which is not among the factors")
         return self
-
-    @property
-    def claim(self) -> str:
-        if self.limit is None:
-            return ""
-        return f"a violation has at most probability {self.limit:g} at the size {self.at:g}"
 
 
 def _run(asked: AskedDegradation, ground: Ground) -> Finding:

@@ -17,10 +17,9 @@ from ...robustness import Space
 from ...robustness.search.failure_map import boundary, failure_map
 from ...robustness.stl.spec import violates
 from ..file.asked import Asked, Pair, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.tables import known
-from ..result import Result
+from ..result import Finding, Result
 
 _CAPTION = (
     "Margin over the plane, the other quantities nominal; between the points that were run, the "

@@ -29,11 +29,10 @@ from ...robustness.stl.text import parse_formula
 from ...robustness.stl.violation_time import ViolationTime, violation_time
 from ..build import faults_of
 from ..file.asked import Asked, Flag, Names, Size
-from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_in_words, margin_text
-from ..result import Result
+from ..result import Finding, Result
 
 TOGETHER = 256  # unfinished runs that are simulated again in batches
 _MOST = 40  # rows of the table of pairs

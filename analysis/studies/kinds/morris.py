@@ -12,11 +12,10 @@ from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Design, Space, elementary_effects, morris
 from ..file.asked import Asked, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
-from ..result import Result
+from ..result import Finding, Result
 from .context import response
 
 MORRIS_CAPTION = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -13,11 +13,10 @@ from ...report.document import Item
 from ...robustness import bound_verdict, violation_probability
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked, Confidence
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
-from ..result import Result
-from .context import CLOPPER, HOWARD, ROBBINS, statement_numbers
+from ..result import Finding, Result
+from .context import CLOPPER, HOWARD, ROBBINS
 
 DECIDES_FIXED = (
     " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "
@@ -32,6 +31,7 @@ class Probability(Asked):
     confidence: Confidence = 0.99
     side: Literal["upper", "lower", "both"] = "upper"
     limit: Confidence | None = Field(None, description="Claim: the upper bound is at most this.")
+    claimed: ClassVar[str] = "a violation has at most probability {limit:g}"
 
     @model_validator(mode="after")
     def _needs_upper(self) -> Probability:
@@ -39,18 +39,13 @@ class Probability(Asked):
             raise ValueError("a limit needs side = 'upper' or 'both', got 'lower'")
         return self
 
-    @property
-    def claim(self) -> str:
-        limit = self.limit
-        return "" if limit is None else f"a violation has at most probability {limit:g}"
-
 
 def _run(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
     violation = violation_probability(design, margins, asked.confidence, asked.side)
     verdict = {} if asked.limit is None else vars(bound_verdict(violation, asked.limit))
     return finding_of(
-        asked, str(violation), **verdict, runs=violation.runs, numbers=statement_numbers(violation)
+        asked, str(violation), **verdict, runs=violation.runs, numbers=violation.plain()
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -13,13 +13,12 @@ from ...report.document import Item, captioned
 from ...robustness.search.largest_scale import largest_scale
 from ...robustness.search.radius import robustness_radius
 from ..file.asked import Confidence, Size, Varied, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_in_words, margin_text
-from ..result import Result
-from .context import AUGER, CLOPPER, HANSEN, SEARCHED, statement_numbers
+from ..result import Finding, Result
+from .context import AUGER, CLOPPER, HANSEN, SEARCHED
 
 SIZES = 12  # that the search tries, roughly
 _CAPTION = "Sizes that were tried, as factors of the box, with the lowest margin found there."
@@ -35,10 +34,7 @@ class AskedRadius(Varied):
     draws: Whole = Field(459, ge=0, description="Independent draws for the statement.")
     confidence: Confidence = 0.99
     limit: Size | None = Field(None, description="Claim: none is found below this size.")
-
-    @property
-    def claim(self) -> str:
-        return "" if self.limit is None else f"no violation is found below size {self.limit:g}"
+    claimed: ClassVar[str] = "no violation is found below size {limit:g}"
 
 
 def _run(asked: AskedRadius, ground: Ground) -> Finding:
@@ -59,7 +55,7 @@ def _run(asked: AskedRadius, ground: Ground) -> Finding:
     numbers: dict[str, Any] = {"upper": radius.upper, "searched": radius.searched}
     numbers |= {"largest": radius.largest, "margin": radius.margin, "witness": radius.witness}
     if radius.statement is not None:
-        numbers["statement"] = statement_numbers(radius.statement)
+        numbers["statement"] = radius.statement.plain()
     return finding_of(
         asked,
         str(radius),

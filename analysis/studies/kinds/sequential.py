@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -12,10 +13,10 @@ from ...robustness import decide, test_verdict
 from ...robustness.runs.progress import until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked, Confidence
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
-from .context import HOWARD, ROBBINS, statement_numbers
+from ..result import Finding
+from .context import HOWARD, ROBBINS
 
 DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
 
@@ -25,10 +26,7 @@ class Sequential(Asked):
 
     confidence: Confidence = 0.99
     limit: Confidence = Field(description="Claim: the probability is below this.")
-
-    @property
-    def claim(self) -> str:
-        return f"the probability of a violation is below {self.limit:g}"
+    claimed: ClassVar[str] = "the probability of a violation is below {limit:g}"
 
 
 def _run(asked: Sequential, ground: Ground) -> Finding:
@@ -39,7 +37,7 @@ def _run(asked: Sequential, ground: Ground) -> Finding:
         str(test),
         **vars(test_verdict(test)),
         runs=test.statement.runs,
-        numbers={"decision": test.decision, **statement_numbers(test.statement)},
+        numbers={"decision": test.decision, **test.statement.plain()},
     )
 
 

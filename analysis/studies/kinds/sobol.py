@@ -12,11 +12,10 @@ from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Design, Space, saltelli, sobol_indices
 from ..file.asked import Asked, Confidence, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
-from ..result import Result
+from ..result import Finding, Result
 from .context import response
 
 SOBOL_CAPTION = (

@@ -19,11 +19,10 @@ from ...report.document import Item, captioned
 from ...robustness import Experiment, Space, Uncertain, from_table, nominal
 from ...robustness.uncertainty.space import arguments_of_row
 from ..file.asked import Asked
-from ..finding import Finding
 from ..kind import Ground, Kind, Setup, column, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
-from ..result import Result
+from ..result import Finding, Result
 
 _CAPTION = (
     "'{of}' is {value:.4g} at the nominal values. Bars: its derivative by each quantity times the "

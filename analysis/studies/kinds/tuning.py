@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -34,13 +34,12 @@ from ...robustness import (
 from ...robustness.runs.experiment import signals_of_rows
 from ...robustness.statistics.guarantee import rounded_up
 from ..file.asked import Asked, Confidence, Pair, Size, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..page.text import DID_NOT_END, margin_text
-from ..result import Result
-from .context import CLOPPER, statement_numbers
+from ..result import Finding, Result
+from .context import CLOPPER
 
 _BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
 _TRIED = "What every choice of gains was worth on the samples that gains were found on."
@@ -79,12 +78,7 @@ class Tuning(Asked):
     limit: Confidence | None = Field(
         None, description="Claim: after it a violation has at most this probability."
     )
-
-    @property
-    def claim(self) -> str:
-        if self.limit is None:
-            return ""
-        return f"with these gains a violation has at most probability {self.limit:g}"
+    claimed: ClassVar[str] = "with these gains a violation has at most probability {limit:g}"
 
 
 def _experiment(asked: Tuning, setup: Setup) -> Experiment:
@@ -235,8 +229,8 @@ def _numbers(tuned: Tuned, before: Violation, after: Violation) -> dict[str, Any
         "differentiated_runs": tuned.differentiated_runs,
         "message": tuned.message,
         "notes": list(tuned.notes),
-        "fresh_before": statement_numbers(before),
-        "fresh_after": statement_numbers(after),
+        "fresh_before": before.plain(),
+        "fresh_after": after.plain(),
     }
 
 

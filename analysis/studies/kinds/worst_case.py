@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -20,12 +20,11 @@ from ...robustness.search.evaluation import margins_of
 from ...robustness.search.shrink import shrink
 from ...robustness.search.worst_case import worst_case
 from ..file.asked import Flag, Number, Varied, Whole
-from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import DID_NOT_END, margin_in_words, margin_text, status_text
-from ..result import Result
+from ..result import Finding, Result
 from .context import AUGER, HANSEN, SEARCHED
 
 SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
@@ -42,10 +41,7 @@ class AskedWorstCase(Varied):
     shrink: Flag = Field(True, description="Whether a violation is reduced to few deviations.")
     python_control: Flag = Field(False, description="Whether python-control confirms it as well.")
     limit: Number | None = Field(None, description="Claim: no margin found is this low.")
-
-    @property
-    def claim(self) -> str:
-        return "" if self.limit is None else f"no margin of {self.limit:g} or lower is found"
+    claimed: ClassVar[str] = "no margin of {limit:g} or lower is found"
 
 
 def _run(asked: AskedWorstCase, ground: Ground) -> Finding:

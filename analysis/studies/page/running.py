@@ -15,8 +15,7 @@ from ...report.document import Item, captioned
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ...robustness.statistics.sequential import sequence_bounds
 from ...robustness.stl.spec import violates
-from ..finding import Finding
-from ..result import Result
+from ..result import Finding, Result
 
 _POINTS = 150  # of the estimate
 _RUNNING = (

@@ -1,4 +1,4 @@
-"""Kinds of analysis of one's own: what a study file means by ``kind = "spread.py:spread"``."""
+"""The shape of a study file, with kinds of one's own: what ``kind = "spread.py:spread"`` means."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, create_model
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
 from ..code.rule import Grant, untrusted
 from ..file.asked import Asked
-from ..file.errors import KeyPath, Problem
+from ..file.errors import Problem
 from ..file.schema import Study
-from ..finding import Finding
+from ..file.toml import KeyPath, read_toml
 from ..kind import Ground, Kind, tagged
 from ..kinds import KINDS
 from ..resolve import named_kind
+from ..result import Finding
 
 STAND_IN = "gone"
 """Name of the kinds that stand in for those that are not known."""
@@ -43,6 +45,45 @@ def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
 def model_of(kinds: Mapping[str, Kind]) -> type[Study]:
     """Return the shape of study files with nlctl's kinds of analysis and some of one's own."""
     return study_model((*((kind.name, kind) for kind in KINDS), *kinds.items()))
+
+
+@as_annotated
+def from_toml(text: str, kinds: Mapping[str, Kind] | None = None) -> Study:
+    """Return the study in a text that `to_toml` has written.
+
+    Parameters
+    ----------
+    text : str
+        In TOML.
+    kinds : mapping of str to Kind, optional
+        Kinds of analysis of one's own, as the text calls them.
+
+    Returns
+    -------
+    Study
+        Equal to the one that was written.
+
+    Raises
+    ------
+    ValueError
+        If it is not a study.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.studies import from_toml
+    >>> study = from_toml('''
+    ... loop = "example-1"
+    ... study = { title = "Does it track?", seed = 1 }
+    ... space."actuator.b_r".uniform = [0.3, 0.7]
+    ... spec.tracks = "always from 10 s on |e| <= 0.15"
+    ... time = { end = 20.0, step = 0.01 }
+    ... ''')
+    >>> study.space["actuator.b_r"].uniform, study.spec["tracks"].formula
+    ((0.3, 0.7), 'always from 10 s on |e| <= 0.15')
+    >>> study.solver.rtol  # the default
+    1e-08
+    """
+    return model_of(kinds or {}).model_validate(read_toml(text))
 
 
 def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], list[Problem]]:

@@ -16,21 +16,13 @@ from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 
-from ..code.record import study_digest
 from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
-from ..file.errors import (
-    KeyPath,
-    Problem,
-    StudyError,
-    line_numbers,
-    located,
-    place_text,
-    schema_problems,
-)
+from ..file.errors import Problem, StudyError, located, place_text, schema_problems
 from ..file.schema import Study
-from ..file.toml import check_depth, read_toml, study_text
+from ..file.toml import KeyPath, check_depth, line_numbers, read_toml, study_text
 from ..kind import Setup
 from ..resolve import checked_definition
+from ..sealed import digest_of
 from .own_kinds import model_of, own_kinds
 from .validate import checked_experiment
 
@@ -111,7 +103,7 @@ def read_study(
     except ValueError as error:
         raise StudyError(str(path), [Problem(place=(), message=str(error))]) from None
     reach: Reach = "all" if trust else "nlctl" if received else "study"
-    grant = Grant(reach=reach, folder=folder, study=study_digest(data))
+    grant = Grant(reach=reach, folder=folder, study=digest_of(data))
     kinds, mistaken = own_kinds(data, grant)
     study, problems, entries = _validated(data, model_of(kinds), mistaken)
     experiment = None

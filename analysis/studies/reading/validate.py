@@ -18,9 +18,8 @@ from nlctl.upstream.control_internals import is_system
 
 from ...metrics import Metric
 from ...robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
-from ...robustness.search.largest_scale import refusal_of
 from ...robustness.statistics.guarantee import check_iid
-from ...robustness.uncertainty.binding import check_keyword
+from ...robustness.uncertainty.binding import check_keyword, refusal_of
 from ...robustness.uncertainty.space import combinations
 from ..build import (
     SIGNALS,
@@ -36,8 +35,9 @@ from ..build import (
     times,
 )
 from ..file.asked import Asked
-from ..file.errors import KeyPath, Problem
+from ..file.errors import Problem
 from ..file.schema import RESERVED, Faulty, Study
+from ..file.toml import KeyPath
 from ..kind import Setup
 from ..resolve import check_complete, loop_function, option, uncertain
 
