@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..expressions.dependence import reads
 from ..expressions.graph import Expr
 from .branches import bounded
-from .causes import Cause, When, when_of
+from .causes import Cause, When, differ, when_of
 from .directions import Direction, SomeRows
 from .names import StatePlaces
 from .returning import Returning
@@ -30,9 +30,11 @@ class TimesThatMove:
 
     def left(self, jumps: Expr) -> When:
         """Return how the time moves at which sides have been left; a clock's does not."""
-        graph = self.source.graph
-        free, causes = graph.op("and", self._alone, jumps), []
+        graph, alone = self.source.graph, self._alone
+        free, causes = graph.op("and", alone, jumps), []
         for side in self.sides.sides:
+            # what no clock can have taken across is met together with it, at a time of its own
+            may_be_met = free if self._follows_clocks(side.here.level) else jumps
             for k in range(side.rows):
                 kept, now, level, extent = (
                     graph.item(e, k)
@@ -40,10 +42,22 @@ class TimesThatMove:
                 )
                 # what a jump that leaves a delay has taken across has not been met at a rate
                 (now,) = self.returning.earlier([now])
-                left = graph.op("and", graph.op("ne", kept, now), free)
+                left = graph.op("ne", kept, now)
+                if side.node is None:  # a memory may switch right at its level
+                    left = graph.op("or", left, graph.op("eq", level, graph.const(0.0)))
+                left = graph.op("and", left, may_be_met)
                 rate, cause = self.met(left, level, extent, self.sides.flow_before)
                 causes += [cause] if rate is not None else []
+        at_clock = graph.op("and", graph.op("not", alone), jumps)
+        still = [graph.const(0.0)] * self.places.by
+        causes.append(Cause(met=at_clock, moves=still, grazes=graph.const(False)))
         return when_of(graph, causes, self.places.by, self.returning.rounding)
+
+    def _follows_clocks(self, level: Expr) -> bool:
+        """Whether a level may jump as a clock ticks."""
+        program = self.source.program
+        jumping = {*program.sampled, *program.memory}
+        return reads([level], "x", jumping) or reads([level], "u", self.source.delayed)
 
     @property
     def _alone(self) -> Expr:
@@ -53,8 +67,8 @@ class TimesThatMove:
         ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
         return graph.op("gt", ago, graph.op("mul", graph.const(2.0), self.returning.rounding))
 
-    def reset(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
-        """Return how the time moves at which a block jumps, and whether two causes differ."""
+    def reset(self, guards: Sequence[Expr]) -> tuple[When, list[Expr]]:
+        """Return how the time moves at which a block jumps, and by what two causes differ."""
         # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
         # or by what was sampled right now: then that says how the time moves.
         graph, source = self.source.graph, self.source
@@ -68,7 +82,11 @@ class TimesThatMove:
         if arrived is not None:
             by_jumps = by_jumps.unless(arrived, self.returning.when, graph)
         left = graph.op("lt", self.sides.margin, graph.const(0.0))
-        together = graph.op("select", fell, left, by_jumps.apart)
+        together = []
+        for one, other, apart in zip(by_itself.moves, by_jumps.moves, by_jumps.apart, strict=True):
+            differs = graph.op("or", apart, differ(graph, one, other, self.returning.rounding))
+            both = graph.op("and", left, differs)
+            together.append(graph.op("select", fell, both, apart))
         return by_jumps.unless(fell, by_itself, graph), together
 
     def _fallen(self, guards: Sequence[Expr]) -> When:

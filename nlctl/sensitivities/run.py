@@ -142,7 +142,8 @@ def _start(
         if quantity.state >= 0:
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
-    start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
+    never = end + 1.0 + abs(end)
+    start[places.together : places.number] = start[places.chosen : places.ticked] = never
     sides, rated = differentiated.sides, differentiated.extended.sent >= Sent.RATES
     if not sides.rows and not differentiated.compiled.program.sampled and not rated:
         return start, []
