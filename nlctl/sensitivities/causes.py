@@ -19,6 +19,7 @@ class When:
     grazes: Expr  # whether what it depends on is there at a rate of 0
     apart: list[Expr]  # by each quantity, whether two conditions say different things
     happens: Expr  # whether anything happens at a time that moves
+    met: Expr  # whether anything has been met at a rate
 
     def unless(self, condition: Expr, other: When, graph: Graph) -> When:
         """Return this, or another if a condition holds."""
@@ -32,6 +33,7 @@ class When:
         return When(
             moves=each(self.moves, other.moves), apart=each(self.apart, other.apart),
             grazes=either(self.grazes, other.grazes), happens=either(self.happens, other.happens),
+            met=either(self.met, other.met),
         )  # fmt: skip
 
 
@@ -65,7 +67,14 @@ def when_of(graph: Graph, causes: Sequence[Cause], by: int, rounding: Expr) -> W
             apart[j] = graph.op("or", apart[j], graph.op("and", met, differs))
     for move in moves:
         happens = graph.op("or", happens, graph.op("ne", move, zero))
-    return When(moves=moves, grazes=grazes, apart=apart, happens=happens)
+    return When(moves=moves, grazes=grazes, apart=apart, happens=happens, met=moving)
+
+
+def at_once(graph: Graph, one: When, other: When, rounding: Expr) -> list[Expr]:
+    """Return by each quantity whether what is met at one instant says different things."""
+    rows = zip(one.moves, other.moves, other.apart, strict=True)
+    differing = [graph.op("or", apart, differ(graph, a, b, rounding)) for a, b, apart in rows]
+    return [graph.op("and", other.met, differs) for differs in differing]
 
 
 def differ(graph: Graph, one: Expr, other: Expr, rounding: Expr) -> Expr:

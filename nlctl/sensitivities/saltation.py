@@ -15,10 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
+from .causes import at_once
 from .directions import Direction, SomeRows, Taken, rows_replaced
 from .moving_times import TimesThatMove
 from .names import StatePlaces
@@ -53,7 +54,8 @@ class Saltation:
         sent = self._sent(self._seen(arriving, before), self._seen(source.single_arriving, behind))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
-        when = self.when.left(source.any_of([jumps, *sent, *switches]))
+        flows = source.any_of([jumps, *switches])
+        when = self.when.left(source.any_of([flows, *sent]), flows)
         rows: list[SomeRows] = []
         for j, move in enumerate(when.moves):
             states, broken = [], graph.op("or", when.grazes, when.apart[j])
@@ -181,7 +183,11 @@ class Saltation:
             rows += [(graph.op("select", apart, graph.const(0.0), s), n) for s, n in states]
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
-        together = [graph.op("or", apart, returning.several) for apart in when.apart]
+        others = at_once(graph, when, self.when.left(graph.const(True)), returning.rounding)
+        together = [
+            reduce(partial(graph.op, "or"), (apart, other, returning.several))
+            for apart, other in zip(when.apart, others, strict=True)
+        ]
         rows += self._first_times(self.places.together, together)
         arriving = self._earlier(source.single_arriving)
         sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
