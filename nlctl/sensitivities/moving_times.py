@@ -96,7 +96,7 @@ class TimesThatMove:
         return by_jumps.unless(fell, by_itself, graph), together
 
     def _fallen(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
-        """Return how the time moves at which a guard has fallen, the nearest to 0, and how long ago."""
+        """Return how the time moves at which the guard nearest to 0 has fallen; how long ago."""
         graph = self.source.graph
         far = nearest = graph.const(_FAR)
         yes, fallen_guards = graph.const(True), []

@@ -48,8 +48,9 @@ def sensitivity_response(
     ----------
     diagram : control.NonlinearIOSystem or Compiled
         A diagram, or what `nlctl.compile` made of it; compile once for many runs.
-    timepts : array_like of shape (m,)
-        Times in s at which inputs are given, and signals and derivatives are computed; also ``T``.
+    timepts : array_like of shape (m,), optional
+        Times in s at which inputs are given, and signals and derivatives are computed; they are
+        needed, under this name or as ``T``.
     inputs : array_like, list or float, optional
         Inputs over `timepts`, as in `nlctl.input_output_response`; also ``U``.
     initial_state : mapping, array_like or float, optional

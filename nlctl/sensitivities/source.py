@@ -183,7 +183,7 @@ class EquationParts:
         return [level for level in levels if not self.leaves([level], self.driven)]
 
     def choices(self, name: str) -> list[tuple[Expr, Expr]]:
-        """Levels of what has another derivative on either side, in samples; each with its extent."""
+        """Levels of what has another derivative on either side, in samples; with their extents."""
         chosen = conditions(e for e, _ in self.equations.pieces(name))
         graph, pairs = self.graph, []
         for condition, level in zip(chosen, self._levels(chosen), strict=True):

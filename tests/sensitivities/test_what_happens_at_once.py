@@ -1,4 +1,4 @@
-"""Two things at one instant, ticks of clocks among them: by what there are derivatives, and what."""
+"""Two things at one instant, ticks of clocks among them: by what there are derivatives."""
 
 import control as ct
 import numpy as np
