@@ -82,7 +82,8 @@ def sensitivity_response(
         it is NaN from there on, and ``response.missing`` says when, where and why: a condition
         that is met at a rate of 0 (grazing), two at one instant, a start on a condition, a memory
         that is touched at its end by a corner, switches without end, a jump that comes back through
-        a delay that varies.
+        a delay that varies.  An output with a corner of its own, as a norm at 0, has none there,
+        and has one again behind it.
 
     Raises
     ------
