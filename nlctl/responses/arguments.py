@@ -61,6 +61,7 @@ def with_aliases(
     aliases: Mapping[str, Any],
     function: Callable[..., Any],
     short_names: Mapping[str, str] = ALIASES,
+    needed: Sequence[str] = ("timepts",),
 ) -> dict[str, Any]:
     """Return arguments of a function by their full names."""
     found = dict(given)
@@ -75,7 +76,7 @@ def with_aliases(
         if given[full] is not parameters[full].default:
             raise ParameterError(f"'{full}' is given twice, as {full}= and as {name}=")
         found[full] = value
-    if found.get("timepts", 0.0) is None:
+    if any(found.get(name, 0.0) is None for name in needed):
         raise ParameterError("timepts is missing: give the times of the response, in s")
     return found
 

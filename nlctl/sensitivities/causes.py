@@ -17,8 +17,9 @@ class When:
 
     moves: list[Expr]  # its derivative by each quantity
     grazes: Expr  # whether what it depends on is there at a rate of 0
-    apart: Expr  # whether two conditions say different things
+    apart: list[Expr]  # by each quantity, whether two conditions say different things
     happens: Expr  # whether anything happens at a time that moves
+    met: Expr  # whether anything has been met at a rate
 
     def unless(self, condition: Expr, other: When, graph: Graph) -> When:
         """Return this, or another if a condition holds."""
@@ -26,10 +27,13 @@ class When:
         def either(one: Expr, two: Expr) -> Expr:
             return graph.op("select", condition, two, one)
 
+        def each(ones: Sequence[Expr], twos: Sequence[Expr]) -> list[Expr]:
+            return [either(*pair) for pair in zip(ones, twos, strict=True)]
+
         return When(
-            moves=[either(*pair) for pair in zip(self.moves, other.moves, strict=True)],
-            grazes=either(self.grazes, other.grazes), apart=either(self.apart, other.apart),
-            happens=either(self.happens, other.happens),
+            moves=each(self.moves, other.moves), apart=each(self.apart, other.apart),
+            grazes=either(self.grazes, other.grazes), happens=either(self.happens, other.happens),
+            met=either(self.met, other.met),
         )  # fmt: skip
 
 
@@ -55,15 +59,28 @@ def when_of(graph: Graph, causes: Sequence[Cause], by: int, rounding: Expr) -> W
         moving = graph.op("or", moving, met)
         grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
     grazes = graph.op("and", grazes, graph.op("not", moving))
-    apart = happens = no
-    agree, still = graph.const(_AGREE), graph.op("mul", graph.const(_AT_REST), rounding)
+    apart, happens = [no] * by, no
     for cause in causes:
         met = graph.op("and", cause.met, graph.op("not", cause.grazes))
-        for a, b in zip(cause.moves, moves, strict=True):
-            gap = graph.op("absolute", graph.op("sub", a, b))
-            size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
-            differs = graph.op("gt", gap, graph.op("add", still, graph.op("mul", agree, size)))
-            apart = graph.op("or", apart, graph.op("and", met, differs))
+        for j, move in enumerate(cause.moves):
+            differs = differ(graph, move, moves[j], rounding)
+            apart[j] = graph.op("or", apart[j], graph.op("and", met, differs))
     for move in moves:
         happens = graph.op("or", happens, graph.op("ne", move, zero))
-    return When(moves=moves, grazes=grazes, apart=apart, happens=happens)
+    return When(moves=moves, grazes=grazes, apart=apart, happens=happens, met=moving)
+
+
+def at_once(graph: Graph, one: When, other: When, rounding: Expr) -> list[Expr]:
+    """Return by each quantity whether what is met at one instant says different things."""
+    rows = zip(one.moves, other.moves, other.apart, strict=True)
+    differing = [graph.op("or", apart, differ(graph, a, b, rounding)) for a, b, apart in rows]
+    return [graph.op("and", other.met, differs) for differs in differing]
+
+
+def differ(graph: Graph, one: Expr, other: Expr, rounding: Expr) -> Expr:
+    """Return whether two times move by different derivatives."""
+    gap = graph.op("absolute", graph.op("sub", one, other))
+    size = graph.op("add", graph.op("absolute", one), graph.op("absolute", other))
+    still = graph.op("mul", graph.const(_AT_REST), rounding)
+    least = graph.op("add", still, graph.op("mul", graph.const(_AGREE), size))
+    return graph.op("gt", gap, least)

@@ -53,6 +53,7 @@ class Fit:
     covariance: np.ndarray
     # Parameters that data do not determine, or not apart from each other.
     unidentifiable: tuple[str, ...]
+    at_bounds: tuple[str, ...]  # Parameters at a bound of their search: errors take no bounds.
     noise: float  # Standard deviation of the residuals, in units of `sigma`.
     freedom: int  # Number of data less that of parameters.
     experiments: tuple[FittedExperiment, ...]  # In the order of the data, one at least.
@@ -125,6 +126,8 @@ class Fit:
         lines += [f"  {name} = {value:.6g} +- {error:.2g}" for name, value, error in rows]
         if self.unidentifiable:
             lines.append(f"  not identifiable from these data: {', '.join(self.unidentifiable)}")
+        if self.at_bounds:
+            lines.append(f"  at a bound, which errors do not know: {', '.join(self.at_bounds)}")
         lines += [
             f"  {lack}: data behind that say nothing" + (f" (in '{one.name}')" if several else "")
             for one in self.experiments

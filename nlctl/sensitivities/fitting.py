@@ -18,7 +18,8 @@ from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..native.floats import with_floats
-from ..params import as_numbers
+from ..params import as_numbers, integer
+from ..responses.arguments import checked_params, with_aliases
 from .fitted import Fit, FittedExperiment
 from .measured import Measurement, Observations, check_tell, measurements, observations
 from .names import VariedQuantity, checked_names, parameters_and_states, varied_quantities
@@ -48,6 +49,7 @@ def fit(
     rtol: float = 1e-8,
     atol: float = 1e-10,
     max_evaluations: int = 100,
+    **aliases: object,
 ) -> Fit:
     """Find parameters and initial states with which a run fits data.
 
@@ -61,7 +63,7 @@ def fit(
     diagram : control.NonlinearIOSystem or Compiled
         A diagram, or what `nlctl.compile` made of it.
     timepts : array_like of shape (m,), optional
-        Times of the data (s); a table has its own.
+        Times of the data (s); a table has its own.  Also ``T``.
     data : mapping, pandas.DataFrame, Measurement or sequence of these, optional
         Always given, by its name where there are no `timepts`:
         ``{"y": samples of shape (m,)}`` by signals as in `nlctl.sensitivity_response`; NaN where
@@ -75,9 +77,9 @@ def fit(
         ``(start, low, high)`` with bounds of one's own.
         Initial states are ``"plant.x1(0)"``.  Several experiments share them.
     inputs : array_like, list or float, optional
-        Inputs over `timepts`, 0 by default.
+        Inputs over `timepts`, 0 by default.  Also ``U``.
     initial_state : mapping, array_like or float, optional
-        Of what is not sought.
+        Of what is not sought.  Also ``X0``.
     separate : sequence of str, optional
         Names in `parameters` of which each experiment has a value of its own, such as initial
         states; in the result ``"plant.x1(0) in experiment 2"``.
@@ -89,6 +91,8 @@ def fit(
         Tolerances of the runs.
     max_evaluations : int, optional
         Runs after which the search is given up.
+    **aliases : object
+        python-control's short names: ``T``, ``U``, ``X0``.
 
     Returns
     -------
@@ -121,12 +125,14 @@ def fit(
     >>> print(round(nlctl.fit(lag, data=table, parameters={"lag.T": 1.0}, inputs=1.0)["lag.T"], 6))
     0.4
     """
-    if not parameters:
-        raise ParameterError("fit needs at least one parameter, {'plant.a': 1.0}")
-    common = Measurement(
-        data={}, timepts=timepts, inputs=inputs, initial_state=initial_state, params=params,
-        sigma=sigma,
-    )  # fmt: skip
+    if not parameters or not isinstance(parameters, Mapping):
+        raise ParameterError(
+            f"fit needs at least one parameter, {{'plant.a': 1.0}}, got {parameters!r}"
+        )
+    integer("fit", "max_evaluations", max_evaluations, at_least=1)
+    named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
+    named = with_aliases(named, aliases, fit, needed=())
+    common = Measurement(data={}, params=checked_params(params), sigma=sigma, **named)
     measured = measurements(data, common)
     if not isinstance(diagram, Compiled):
         first = measured[0]
@@ -162,6 +168,7 @@ def _fit_of(search: _Search, optimum: Any, names: tuple[str, ...]) -> Fit:
     return Fit(
         names=names, values=optimum.x, covariance=covariance,
         unidentifiable=tuple(n for n, u in zip(names, unseen, strict=True) if u),
+        at_bounds=tuple(n for n, at in zip(names, optimum.active_mask, strict=True) if at),
         noise=noise, freedom=freedom, success=bool(optimum.status > 0),
         message=str(optimum.message),
         experiments=tuple(run.fitted(optimum.x) for run in search.runs),

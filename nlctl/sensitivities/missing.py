@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -25,12 +26,13 @@ _RETURNS = "a jump at a time that moves comes back through a delay that varies"
 _ENDLESS = "switches follow each other without end"
 _LOST = "the derivatives cannot be integrated further, although the run itself can"
 _KINK = "the run stays on a kink, and on either side of it if it is moved"
-_FIRST = "what jumps at the start is at a kink or jump, and on either side of it if it is moved"
+_FIRST = "what is driven at the start is at a kink or jump, and on either side of it if it is moved"
+_CHOSEN = "what is sampled is right at a kink or jump, and on either side of it if it is moved"
 _PAIRS = 32  # of times one after the other, at which a run may be on a kink
 _START = "the run starts on a condition, and on either side of it if it is moved"
 _TOUCHED = "a memory is touched at its end and no further, and is moved, or not, by what moves that"
 _CORNERED = "a memory turns where its input has two corners, each at another time if it is moved"
-_MARKS = (("together", _TOGETHER), ("at_reset", _TOGETHER), ("grazing", _GRAZING))
+_MARKS = (("together", _TOGETHER), ("at_reset", _TOGETHER), ("chosen", _CHOSEN))  # by quantity
 
 
 def missing(
@@ -46,13 +48,18 @@ def missing(
         differentiated=differentiated, compiled=compiled, names=names, trajectory=trajectory,
         given=given, commits=commits,
     )  # fmt: skip
-    first = sorted(run.later(), key=lambda lack: lack.time)[:1]
+    later = sorted(run.later(), key=lambda lack: lack.time)
+    return [*_first_of([*run.at_start(), *run.at_first_jump(), *run.at_kinks()]), *_first_of(later)]
+
+
+def _first_of(every: Sequence[NoDerivative]) -> list[NoDerivative]:
+    """Return of several lacks by a quantity the first."""
     lacks: list[NoDerivative] = []
-    for lack in (*run.at_start(), *run.at_first_jump(), *run.at_kinks()):
+    for lack in every:
         known = {name for other in lacks for name in other.with_respect_to}
         others = tuple(name for name in lack.with_respect_to if name not in known)
         lacks += [replace(lack, with_respect_to=others)] if others else []
-    return [*lacks, *first]
+    return lacks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,11 +78,13 @@ class _Run:
         times, start, p = self.given[:3]
         places, end = self.differentiated.places, float(self.trajectory.statistics.time)
         last = self.trajectory.states[:, -1] if self.trajectory.time.size else start
-        lacks = [
-            self._lack(float(last[getattr(places, name)]), why)
-            for name, why in _MARKS
-            if last[getattr(places, name)] <= end
-        ]
+        grazing = float(last[places.grazing])
+        lacks = [self._lack(grazing, _GRAZING)] if grazing <= end else []
+        for name, why in _MARKS:
+            place = getattr(places, name)
+            times = last[place : place + places.by]
+            first = np.unique(times[times <= end])
+            lacks += [self._lack(float(when), why, times == when) for when in first]
         for place, why in ((places.touched, _TOUCHED), (places.cornered, _CORNERED)):
             for k, m in enumerate(self.differentiated.sides.source.driven):
                 if last[place + k] <= end:
@@ -104,10 +113,7 @@ class _Run:
         """Return by what there are none, as what is sampled or driven at the start has two."""
         if not self.commits:
             return []
-        source, last = self.differentiated.sides.source, self.differentiated.places.last
-        sampled = source.program.sampled and self.commits[0]["x"][last, 0] == self.given[0][0]
-        choices = source.choices if sampled else []
-        lacks = self._where_met(choices, self._start, _FIRST)
+        source, lacks = self.differentiated.sides.source, []
         for k, arrays in enumerate(self.commits):
             edges = source.edges(left_where_they_are(source, self.commits, k))
             lacks += self._where_met(edges, arrays, _FIRST)
@@ -121,8 +127,7 @@ class _Run:
             return []
         first = np.unique(np.linspace(0, trajectory.time.size - 2, count).astype(int))
         one, other = self._along(first), self._along(first + 1)
-        levels = [*source.kinks, *source.choices]
-        return self._where_met(levels, one, _KINK, other)
+        return self._where_met(source.kinks, one, _KINK, other)
 
     def _where_met(
         self,
@@ -192,12 +197,13 @@ class _Run:
         arrays = {"t": trajectory.time[None], "x": trajectory.states, "u": trajectory.inputs}
         return {**{name: array[:, rows] for name, array in arrays.items()}, "p": p[:, None]}
 
-    def _lack(self, time: float, why: str) -> NoDerivative:
-        """Return it with the names of what happens then."""
+    def _lack(self, time: float, why: str, by: np.ndarray | None = None) -> NoDerivative:
+        """Return it with the names of what happens then; by all quantities, or by some."""
+        names = tuple(n for j, n in enumerate(self.names) if by is None or by[j])
         when, labels = self._events
         happened = dict.fromkeys(labels[k][:2] for k in np.flatnonzero(when == time))
         where = ", ".join(f"{which} of '{block}'" for block, which in happened if block)
-        return NoDerivative(time=time, where=where, why=why, with_respect_to=self.names)
+        return NoDerivative(time=time, where=where, why=why, with_respect_to=names)
 
     def _owner(self, m: int) -> str:
         """Return the block that a state belongs to."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..expressions.dependence import reads
 from ..expressions.graph import Expr
 from .branches import bounded
-from .causes import Cause, When, when_of
+from .causes import Cause, When, at_once, differ, when_of
 from .directions import Direction, SomeRows
 from .names import StatePlaces
 from .returning import Returning
@@ -28,11 +28,14 @@ class TimesThatMove:
     seeds: Sequence[Direction]
     returning: Returning
 
-    def left(self, jumps: Expr) -> When:
+    def left(self, jumps: Expr, flows: Expr | None = None) -> When:
         """Return how the time moves at which sides have been left; a clock's does not."""
-        graph = self.source.graph
-        free, causes = graph.op("and", self._alone, jumps), []
+        # What only goes into delays does not meet a clock, but what `flows`.
+        graph, alone = self.source.graph, self._alone()
+        free, causes = graph.op("and", alone, jumps), []
         for side in self.sides.sides:
+            # what no clock can have taken across is met together with it, at a time of its own
+            may_be_met = free if self._follows_clocks(side.here.level) else jumps
             for k in range(side.rows):
                 kept, now, level, extent = (
                     graph.item(e, k)
@@ -40,21 +43,33 @@ class TimesThatMove:
                 )
                 # what a jump that leaves a delay has taken across has not been met at a rate
                 (now,) = self.returning.earlier([now])
-                left = graph.op("and", graph.op("ne", kept, now), free)
+                left = graph.op("ne", kept, now)
+                if side.node is None:  # a memory may switch right at its level
+                    left = graph.op("or", left, graph.op("eq", level, graph.const(0.0)))
+                left = graph.op("and", left, may_be_met)
                 rate, cause = self.met(left, level, extent, self.sides.flow_before)
                 causes += [cause] if rate is not None else []
+        at_clock = graph.op("and", graph.op("not", alone), jumps if flows is None else flows)
+        still = [graph.const(0.0)] * self.places.by
+        causes.append(Cause(met=at_clock, moves=still, grazes=graph.const(False)))
         return when_of(graph, causes, self.places.by, self.returning.rounding)
 
-    @property
-    def _alone(self) -> Expr:
-        """Whether neither a clock nor a block has made something jump right now."""
-        graph = self.source.graph
-        last = graph.leaf("x", self.places.last, None)
-        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
-        return graph.op("gt", ago, graph.op("mul", graph.const(2.0), self.returning.rounding))
+    def _follows_clocks(self, level: Expr) -> bool:
+        """Whether a level may jump as a clock ticks."""
+        program = self.source.program
+        jumping = {*program.sampled, *program.memory}
+        return reads([level], "x", jumping) or reads([level], "u", self.source.delayed)
 
-    def reset(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
-        """Return how the time moves at which a block jumps, and whether two causes differ."""
+    def _alone(self, ago: Expr | None = None) -> Expr:
+        """Whether neither a clock nor a block has made something jump right now, or so long ago."""
+        graph = self.source.graph
+        now, last = (graph.leaf(*at, None) for at in (("t", 0), ("x", self.places.last)))
+        then = now if ago is None else graph.op("sub", now, ago)
+        since = graph.op("absolute", graph.op("sub", then, last))
+        return graph.op("gt", since, graph.op("mul", graph.const(2.0), self.returning.rounding))
+
+    def reset(self, guards: Sequence[Expr]) -> tuple[When, list[Expr]]:
+        """Return how the time moves at which a block jumps, and by what two causes differ."""
         # A guard that is at least 0 on the sides that are kept has fallen as these have been left,
         # or by what was sampled right now: then that says how the time moves.
         graph, source = self.source.graph, self.source
@@ -62,17 +77,26 @@ class TimesThatMove:
         for guard in earlier:
             sampled = reads([guard], "x", source.program.sampled)
             fallen = graph.op("lt", guard, graph.const(0.0))
-            fell = graph.op("or", fell, graph.op("and", self._alone, fallen) if sampled else fallen)
-        by_itself, by_jumps = self._fallen(earlier), self.left(graph.const(True))
+            alone = graph.op("and", self._alone(), fallen)
+            fell = graph.op("or", fell, alone if sampled else fallen)
+        (by_itself, ago), by_jumps = self._fallen(earlier), self.left(graph.const(True))
         arrived = self.returning.arrives
         if arrived is not None:
             by_jumps = by_jumps.unless(arrived, self.returning.when, graph)
         left = graph.op("lt", self.sides.margin, graph.const(0.0))
-        together = graph.op("select", fell, left, by_jumps.apart)
+        rounding, zero = self.returning.rounding, graph.const(0.0)
+        ticked = graph.op("not", self._alone(ago))
+        unknown = graph.op("and", left, graph.op("not", by_jumps.met))
+        differs = at_once(graph, by_itself, by_jumps, rounding)
+        together = []
+        for move, other, apart in zip(by_itself.moves, differs, by_jumps.apart, strict=True):
+            at_tick = graph.op("and", ticked, differ(graph, move, zero, rounding))
+            by_itself_too = source.any_of([unknown, other, at_tick])
+            together.append(graph.op("select", fell, by_itself_too, apart))
         return by_jumps.unless(fell, by_itself, graph), together
 
-    def _fallen(self, guards: Sequence[Expr]) -> When:
-        """Return how the time moves at which a guard has fallen: the nearest to 0."""
+    def _fallen(self, guards: Sequence[Expr]) -> tuple[When, Expr]:
+        """Return how the time moves at which the guard nearest to 0 has fallen; how long ago."""
         graph = self.source.graph
         far = nearest = graph.const(_FAR)
         yes, fallen_guards = graph.const(True), []
@@ -87,7 +111,7 @@ class TimesThatMove:
                 fallen_guards.append((ago, cause))
                 nearest = graph.op("minimum", nearest, ago)
         causes = [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
-        return when_of(graph, causes, self.places.by, self.returning.rounding)
+        return when_of(graph, causes, self.places.by, self.returning.rounding), nearest
 
     def met(
         self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]

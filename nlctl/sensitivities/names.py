@@ -179,20 +179,20 @@ class StatePlaces:
 
     # where the sides begin that are kept
     kept = property(lambda self: self.states * (1 + self.by))
-    # when two conditions were first met at one instant, by different derivatives
+    # when two conditions were first met at one instant, by each quantity with other derivatives
     together = property(lambda self: self.kept + self.branches)
     # when a condition was first met at a rate of 0
-    grazing = property(lambda self: self.together + 1)
+    grazing = property(lambda self: self.together + self.by)
     # when something first jumped at a time that moves
-    jumped = property(lambda self: self.together + 2)
+    jumped = property(lambda self: self.grazing + 1)
     # when a block last jumped, at a guard or a clock
-    last = property(lambda self: self.together + 3)
-    # when a guard and a condition were first met at one instant
-    at_reset = property(lambda self: self.together + 4)
+    last = property(lambda self: self.grazing + 2)
+    # when a guard and a condition were first met at one instant, by each quantity
+    at_reset = property(lambda self: self.grazing + 3)
     # of either sign, the other behind each reset
-    parity = property(lambda self: self.together + 5)
+    parity = property(lambda self: self.at_reset + self.by)
     # when each memory that is driven was first touched at its end, or hardly moved
-    touched = property(lambda self: self.together + 6)
+    touched = property(lambda self: self.parity + 1)
     # when it first reversed at two corners at once
     cornered = property(lambda self: self.touched + self.driven)
     # where it stood before it was moved
@@ -211,7 +211,9 @@ class StatePlaces:
     arrived = property(
         lambda self: self.brought + self.turns * self.by * self.lines if self.lines else self.number
     )
+    # when each quantity first moved a kink or jump that a sample was right at
+    chosen = property(lambda self: self.arrived + self.lines)
     # when a clock last ticked, and the samples before that, with their derivatives
-    ticked = property(lambda self: self.arrived + self.lines)
+    ticked = property(lambda self: self.chosen + self.by)
     earlier = property(lambda self: self.ticked + (self.samples > 0))
     size = property(lambda self: self.earlier + self.samples)  # number of all states

@@ -31,6 +31,7 @@ from .source import EquationParts, equation_parts
 # How far behind a turn a step ends, of a step: as far as the root of the relative tolerance says,
 # or as the part over which it is seen whether a memory turns.
 _LATE, _AHEAD = 0.5, 1e-4
+_MOVED = 1e3  # times what is known of a number: by less it is not moved
 _PASSED = 1e-14  # of the times: break points of t that are as close are passed together
 
 
@@ -227,7 +228,7 @@ class _Maker:
             sampled=(
                 *before.sampled,
                 *sampled,
-                *([places.last] if before.sampled else []),
+                *([places.last, *range(places.chosen, places.ticked)] if before.sampled else []),
                 *(range(places.ticked, places.size) if places.samples else []),
             ),
         )
@@ -267,7 +268,7 @@ class _Maker:
             jumping += [(owner + 2, row) for row in rows]
         if places.lines:
             rows = [(n, places.kept), *([memories] if places.turns else [])]
-            rows += [(places.together, places.grazing), (places.number, places.ticked)]
+            rows += [(places.together, places.grazing), (places.number, places.chosen)]
             jumping += [(owner + 3, row) for row in rows]
         return (*before.jumping, *((i, *row) for i, row in jumping))
 
@@ -380,17 +381,34 @@ class _Maker:
         for row, array in self.source.equations.results[name]:
             for j in range(self.places.by):
                 samples += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
+        taken = [(row, array.size) for row, array in samples]
         now, behind = graph.leaf("t", 0, None), count * (1 + self.places.by)
-        samples += self._rows(behind, [(now, 1)])
+        samples += self._rows(behind, [(now, 1), *self._when_chosen(name)])
         if not self.places.samples:
             return samples
-        taken = [(row, array.size) for row, array in samples[:-1]]
-        before = self.saltation.turns.sampled
-        samples += self._rows(behind + 1, [(now, 1)])
+        before, behind = self.saltation.turns.sampled, behind + 1 + self.places.by
+        samples += self._rows(behind, [(now, 1)])
         for row, size in taken:
             earlier = [(graph.leaf("x", before[row + k], None), 1) for k in range(size)]
-            samples += self._rows(behind + 2 + row, earlier)
+            samples += self._rows(behind + 1 + row, earlier)
         return samples
+
+    def _when_chosen(self, name: str) -> list[SomeRows]:
+        """Return when samples were first taken right at a kink or jump that each quantity moves."""
+        graph, source, noise = self.source.graph, self.source, self.saltation.when.noise
+        choices = source.choices(name)
+        met = [graph.op("le", graph.op("absolute", e), noise(extent)) for e, extent in choices]
+        least = [graph.op("mul", graph.const(_MOVED), noise(extent)) for _, extent in choices]
+        rows: list[SomeRows] = []
+        for place, seed in enumerate(self.seeds, self.places.chosen):
+            changes = source.slopes([level for level, _ in choices], seed)
+            moved = [
+                graph.op("and", here, graph.op("gt", graph.op("absolute", change), seen))
+                for here, change, seen in zip(met, changes, least, strict=True)
+                if change is not None
+            ]
+            rows.append((source.first_time(place, source.any_of(moved)), 1))
+        return rows
 
 
 def _array(graph: Graph, expr: Expr, size: int) -> Tracer:

@@ -14,7 +14,7 @@ from ..native import Compiled, Tableau, compile  # noqa: A004 (what it does)
 from ..native.diagram.checks import sized
 from ..native.settings import solver_settings
 from ..params import checked_times
-from ..responses.arguments import checked_params
+from ..responses.arguments import checked_params, with_aliases
 from .record import SensitivityResponse
 from .run import RunWithDerivatives, differentiated_run
 
@@ -22,7 +22,7 @@ from .run import RunWithDerivatives, differentiated_run
 @as_annotated
 def sensitivity_response(
     diagram: ct.NonlinearIOSystem | Compiled,
-    timepts: ArrayLike,
+    timepts: ArrayLike | None = None,
     inputs: Any = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
@@ -35,6 +35,7 @@ def sensitivity_response(
     max_steps: int | None = None,
     max_step: float | None = None,
     audit: object = True,
+    **aliases: object,
 ) -> SensitivityResponse:
     """Simulate a diagram together with its derivatives by parameters and initial states.
 
@@ -47,12 +48,13 @@ def sensitivity_response(
     ----------
     diagram : control.NonlinearIOSystem or Compiled
         A diagram, or what `nlctl.compile` made of it; compile once for many runs.
-    timepts : array_like of shape (m,)
-        Times in s at which inputs are given, and signals and derivatives are computed.
+    timepts : array_like of shape (m,), optional
+        Times in s at which inputs are given, and signals and derivatives are computed; they are
+        needed, under this name or as ``T``.
     inputs : array_like, list or float, optional
-        Inputs over `timepts`, as in `nlctl.input_output_response`.
+        Inputs over `timepts`, as in `nlctl.input_output_response`; also ``U``.
     initial_state : mapping, array_like or float, optional
-        As there.
+        As there; also ``X0``.
     with_respect_to : sequence of str or str
         Parameters, ``"law.beta"`` or ``"law.K[1]"``, and initial states, ``"plant.x1(0)"``.
     of : sequence of str or str, optional
@@ -70,6 +72,8 @@ def sensitivity_response(
         Longest step (s).
     audit : bool or "every run", optional
         As in `nlctl.input_output_response`.
+    **aliases : object
+        python-control's short names: ``T``, ``U``, ``X0``.
 
     Returns
     -------
@@ -78,7 +82,8 @@ def sensitivity_response(
         it is NaN from there on, and ``response.missing`` says when, where and why: a condition
         that is met at a rate of 0 (grazing), two at one instant, a start on a condition, a memory
         that is touched at its end by a corner, switches without end, a jump that comes back through
-        a delay that varies.
+        a delay that varies.  An output with a corner of its own, as a norm at 0, has none there,
+        and has one again behind it.
 
     Raises
     ------
@@ -118,6 +123,8 @@ def sensitivity_response(
     >>> print(made["plant.x", "plant.p"].round(6), made["plant.x", "plant.x(0)"].round(6))
     [ 0.  0. -1.] [1. 1. 2.]
     """
+    named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
+    named = with_aliases(named, aliases, sensitivity_response)
     checked_params(params)
     tolerances("sensitivity_response", rtol, atol)
     settings = solver_settings(
@@ -125,9 +132,10 @@ def sensitivity_response(
         max_steps=max_steps, max_step=max_step,
     )  # fmt: skip
     run = RunWithDerivatives(
-        times=checked_times(timepts), inputs=inputs, initial_state=initial_state, params=params,
-        of=of, with_respect_to=with_respect_to, settings=settings, audit=audit,
+        times=checked_times(named["timepts"]), inputs=named["inputs"],
+        initial_state=named["initial_state"], params=params, of=of,
+        with_respect_to=with_respect_to, settings=settings, audit=audit,
     )  # fmt: skip
     if not isinstance(diagram, Compiled):
-        diagram = compile(sized(diagram, inputs, initial_state), params=params)
+        diagram = compile(sized(diagram, run.inputs, run.initial_state), params=params)
     return differentiated_run(diagram, run)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import control as ct
@@ -69,6 +69,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
     reached = run_once(_course(differentiated, run, u), start, whole)
+    reached = _at_its_end(reached, run.times.size, differentiated.outputs)
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
@@ -76,6 +77,15 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     given = (run.times, start, whole, u)
     lacks = missing(differentiated, (compiled, full), reached, given, commits)
     return _response(differentiated, (signals, quantities), (run.times, reached), scale, lacks)
+
+
+def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
+    """Return a run that has come to its end, if only derivatives of outputs are NaN somewhere."""
+    # An output may have a corner of its own, as a norm at 0 has: nothing else knows of it.
+    ended = reached.time.size == samples and np.isfinite(reached.outputs[:outputs]).all()
+    if reached.statistics.status is not Status.DIVERGED or not ended:
+        return reached
+    return replace(reached, statistics=replace(reached.statistics, status=Status.OK))
 
 
 def _alone(compiled: Compiled, run: RunWithDerivatives) -> Any:
@@ -142,7 +152,8 @@ def _start(
         if quantity.state >= 0:
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
-    start[places.together : places.number] = end + 1.0 + abs(end)  # not yet
+    never = end + 1.0 + abs(end)
+    start[places.together : places.number] = start[places.chosen : places.ticked] = never
     sides, rated = differentiated.sides, differentiated.extended.sent >= Sent.RATES
     if not sides.rows and not differentiated.compiled.program.sampled and not rated:
         return start, []

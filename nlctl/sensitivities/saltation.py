@@ -15,10 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
+from .causes import at_once
 from .directions import Direction, SomeRows, Taken, rows_replaced
 from .moving_times import TimesThatMove
 from .names import StatePlaces
@@ -53,11 +54,11 @@ class Saltation:
         sent = self._sent(self._seen(arriving, before), self._seen(source.single_arriving, behind))
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         switches = [self._switches(m) for m in source.catching]
-        when = self.when.left(source.any_of([jumps, *sent, *switches]))
+        flows = source.any_of([jumps, *switches])
+        when = self.when.left(source.any_of([flows, *sent]), flows)
         rows: list[SomeRows] = []
-        broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
-            states = []
+            states, broken = [], graph.op("or", when.grazes, when.apart[j])
             for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
                 if a is not b:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
@@ -67,18 +68,23 @@ class Saltation:
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         moves = self.returning.counts(when, sent)
-        happens = [(e, 1) for e in (when.apart, when.grazes, self.source.any_of(moves))]
+        happens = [(e, 1) for e in (*when.apart, when.grazes, self.source.any_of(moves))]
         brought = self._brought(before, when.moves)
         sent_rows = self.returning.sent(
             moves, arriving, source.single_arriving, when.moves, brought
         )  # fmt: skip
         behind_all = self._behind_breaks([*rows, *happens, *sent_rows])
-        rows, (apart, grazes, jumped) = behind_all[: len(rows)], behind_all[len(rows) :][:3]
-        sent_rows = behind_all[len(rows) + 3 :]
-        rows.append((self.source.first_time(places.together, apart[0]), 1))
-        rows.append((self.source.first_time(places.grazing, grazes[0]), 1))
-        rows.append((self._lost_in_delay(jumped[0]), 1))
-        return [*rows, *sent_rows]
+        first, behind_rows = len(rows) + len(happens), behind_all[: len(rows)]
+        *apart, grazes, jumped = [e for e, _ in behind_all[len(rows) : first]]
+        return [
+            *behind_rows, *self._first_times(places.together, apart),
+            (self.source.first_time(places.grazing, grazes), 1),
+            (self._lost_in_delay(jumped), 1), *behind_all[first:],
+        ]  # fmt: skip
+
+    def _first_times(self, place: int, happens: Sequence[Expr]) -> list[SomeRows]:
+        """Return when some things have first happened, by their states from a place on."""
+        return [(self.source.first_time(place + j, e), 1) for j, e in enumerate(happens)]
 
     def _seen(self, arriving: Sequence[Expr], flow: Sequence[SomeRows]) -> list[list[Expr]]:
         """Return what may jump of what arrives at each delay: rates, too, if memories follow it."""
@@ -129,8 +135,9 @@ class Saltation:
         unseen = graph.op("mul", graph.const(_UNSEEN), source.setting("atol"))
         sent = self._sent(self._seen(earlier, before), later, unseen)
         when, together = self.when.reset(guards)
-        broken, after = graph.op("or", when.grazes, together), []
+        after: list[SomeRows] = []
         for j, move in enumerate(when.moves):
+            broken = graph.op("or", when.grazes, together[j])
             after += self._jumped(j, rows, before, behind, move, broken)
         sides = self.sides.now[: len(self.sides.sides)]
         after += self._after(rows, sides)
@@ -141,7 +148,7 @@ class Saltation:
         moves = self.returning.counts(when, sent)
         after.append((self._lost_in_delay(self.source.any_of(moves)), 1))
         after.append((graph.leaf("t", 0, None), 1))
-        after.append((self.source.first_time(places.at_reset, together), 1))
+        after += self._first_times(places.at_reset, together)
         after.append((graph.op("neg", graph.leaf("x", places.parity, None)), 1))
         brought = self._brought(before, when.moves)
         now = [line[0] for line in later]
@@ -172,11 +179,16 @@ class Saltation:
             if self.places.turns:
                 across = self._across(j, before, behind, move, driving)
                 states = rows_replaced(graph, states, across)
-            rows += [(graph.op("select", when.apart, graph.const(0.0), s), n) for s, n in states]
+            apart = when.apart[j]
+            rows += [(graph.op("select", apart, graph.const(0.0), s), n) for s, n in states]
         if self.places.turns:
             rows += self.sides.now[len(self.sides.sides) :]
-        together = graph.op("or", when.apart, returning.several)
-        rows.append((self.source.first_time(self.places.together, together), 1))
+        others = at_once(graph, when, self.when.left(graph.const(True)), returning.rounding)
+        together = [
+            reduce(partial(graph.op, "or"), (apart, other, returning.several))
+            for apart, other in zip(when.apart, others, strict=True)
+        ]
+        rows += self._first_times(self.places.together, together)
         arriving = self._earlier(source.single_arriving)
         sent = self._sent([[e] for e in arriving], [[e] for e in source.single_arriving])
         sent = [graph.op("or", e, returning.goes_on(i)) for i, e in enumerate(sent)]
@@ -423,11 +435,11 @@ class Saltation:
 
     def _driven_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
         """Return driven memories after a jump of other states."""
-        # First they are what has driven them until then.
+        # First they are what has driven them until then, or what they are reset to.
         driven = self.source.driven
         driving = self.returning.earlier(self._driving)
         return {
-            m: self.source.with_states([become], {**rows, m: earlier})[0]
+            m: self.source.with_states([become], {m: earlier, **rows})[0]
             for (m, become), earlier in zip(driven.items(), driving, strict=True)
         }
 

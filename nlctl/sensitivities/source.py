@@ -151,6 +151,9 @@ class EquationParts:
         roots = [*self._flowing, *self.of_memories, *self.guards]
         turns = self.extended.sent >= Sent.TURNS
         cornered = set(jumping([e for e, _ in self.arriving] if turns else []))
+        # a comparison of what jumps there may turn out the other way by that
+        compared = [a for e in jumping(roots) for a in e.args if a.varies]
+        roots = [*roots, *compared]
         return [
             e for e in jumping(roots)
             if e in cornered or not only_bends(self.graph, roots, e, self.p)
@@ -179,11 +182,17 @@ class EquationParts:
         levels = self._levels([e for e in conditions(roots) if e not in self.jumps])
         return [level for level in levels if not self.leaves([level], self.driven)]
 
-    @cached_property
-    def choices(self) -> list[Expr]:
-        """Levels of what has another derivative on either side, in samples."""
-        names = [name for name in self.equations.results if name.startswith("sample")]
-        return self._levels(conditions(e for name in names for e, _ in self.equations.pieces(name)))
+    def choices(self, name: str) -> list[tuple[Expr, Expr]]:
+        """Levels of what has another derivative on either side, in samples; with their extents."""
+        chosen = conditions(e for e, _ in self.equations.pieces(name))
+        graph, pairs = self.graph, []
+        for condition, level in zip(chosen, self._levels(chosen), strict=True):
+            for k in range(level.size or 1):
+                parts = [graph.item(graph.number(arg), k) for arg in condition.args]
+                sizes = [graph.op("absolute", part) for part in parts]
+                extent = reduce(partial(graph.op, "add"), sizes)
+                pairs.append((graph.item(level, k), extent))
+        return pairs
 
     def edges(self, memories: Sequence[int]) -> list[Expr]:
         """Return levels of what some memories are driven by."""

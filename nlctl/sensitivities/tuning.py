@@ -22,7 +22,7 @@ from ..native.diagram.checks import sized
 from ..native.ensemble import MetricLike
 from ..native.floats import float_parameters, with_floats
 from ..params import as_numbers, checked_times, integer
-from ..responses.arguments import input_array, state_array
+from ..responses.arguments import checked_params, input_array, state_array, with_aliases
 from ..wording import counted
 from .climbing import lower_cost, raise_least_margin
 from .names import checked_names, declared_bounds
@@ -71,7 +71,7 @@ def tune(
     budget: float = 200,
     timepts: ArrayLike | None = None,
     inputs: object = 0.0,
-    initial_state: Mapping[str, float] | None = None,
+    initial_state: Mapping[str, float] | Any = None,
     *,
     cost: MetricLike | None = None,
     samples: Mapping[str, Any] | None = None,
@@ -81,6 +81,7 @@ def tune(
     rtol: float = 1e-6,
     atol: float = 1e-8,
     max_steps: int = 100_000,
+    **aliases: object,
 ) -> Tuned:
     """Find gains with which a loop meets its requirements by the largest margin.
 
@@ -112,8 +113,8 @@ def tune(
         many, says whether there are enough.
     inputs : array_like, list or float, optional
         Inputs over `timepts`.
-    initial_state : mapping, optional
-        Initial states by name.
+    initial_state : mapping, array_like or float, optional
+        As in `nlctl.input_output_response`.
     cost : Metric, optional
         A number of a run of which smaller is better, such as `nlctl.analysis.metrics.Metric`.
     samples : mapping, optional
@@ -129,6 +130,8 @@ def tune(
         Tolerances of the runs.
     max_steps : int, optional
         Attempted steps after which a run counts as one that does not reach its end.
+    **aliases : object
+        python-control's short names of times, inputs and initial states: ``T``, ``U``, ``X0``.
 
     Returns
     -------
@@ -168,8 +171,10 @@ def tune(
     >>> print(found["plant.a"], round(found.margin, 4), round(1 - np.exp(-2) / 0.5, 4))
     2.0 0.7293 0.7293
     """
+    named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
+    named = with_aliases(named, aliases, tune, needed=())
     problem, start = _problem(
-        diagram, (space, spec, cost, samples), (timepts, inputs, initial_state, params),
+        diagram, (space, spec, cost, samples), (*named.values(), checked_params(params)),
         {"rtol": rtol, "atol": atol, "max_steps": max_steps},
     )  # fmt: skip
     number("tune", "budget", budget, above=0)
@@ -302,7 +307,8 @@ def _problem(
         diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
     diagram = with_floats(diagram, checked_names("space", [name for name, _ in _bounds(space)]))
     margins = _margins(spec, cost)
-    params, initial_state = dict(params or {}), dict(initial_state or {})
+    params, states = dict(params or {}), state_array(diagram.system, initial_state)
+    initial_state = dict(zip(state_names(diagram.system), states, strict=True))
     present = _present_values(diagram, params, initial_state)
     rows = [_row(diagram, name, value, present) for name, value in _bounds(space)]
     start, low, high = np.array([row[1:] for row in rows], dtype=float).T

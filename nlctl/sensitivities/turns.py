@@ -135,7 +135,9 @@ class DrivenMemories:
         for m, become in self.source.driven.items():
             causes = [Cause(met=c.here, moves=c.moves, grazes=no) for c in self.corners(become)]
             if len(causes) > 1:
-                apart[m] = when_of(graph, causes, self.places.by, rounding).apart
+                apart[m] = self.source.any_of(
+                    when_of(graph, causes, self.places.by, rounding).apart
+                )
         return apart
 
     def corners(self, level: Expr) -> list[Corner]:

@@ -146,6 +146,9 @@ def test_search_that_is_given_up():
         ({"x": T + np.inf}, {"plant.a": 1.0}, {}, "infinite"),
         ({}, {"plant.a": 1.0}, {}, "at least one signal"),
         ({"x": T}, {}, {}, "at least one parameter"),
+        ({"x": T}, "plant.a", {}, "at least one parameter, .*got 'plant.a'"),
+        ({"x": T}, {"plant.a": 1.0}, {"max_evaluations": 0}, "max_evaluations"),
+        ({"x": T}, {"plant.a": 1.0}, {"U": 1.0, "inputs": 1.0}, "'inputs' is given twice"),
         ({"x": T}, {"plant.a": (1.0, 2.0, 3.0)}, {}, "within its bounds"),
         ({"x": T}, {"plant.a": "one"}, {}, "number to start from"),
         ({"x": T}, {"plant.a": 1.0}, {"sigma": {"y": 1.0}}, "no standard deviation for 'x'"),
@@ -156,6 +159,25 @@ def test_bad_input(data, parameters, more, match):
     """One sentence each."""
     with pytest.raises(nlctl.errors.ParameterError, match=match):
         nlctl.fit(decay(), T, data, parameters, **more)
+
+
+def test_short_names():
+    """T, U and X0 are times, inputs and initial states, as in python-control: a is 2."""
+    x = 1.5 * np.exp(-2 * T)
+    found = nlctl.fit(decay(), data={"x": x}, parameters={"plant.a": 1.0}, T=T, U=0.0, X0=[1.5])
+    assert abs(found["plant.a"] - 2) < 1e-7
+    made = nlctl.sensitivity_response(decay(), T=T, U=0.0, X0=1.5, with_respect_to="plant.a")
+    same = nlctl.sensitivity_response(decay(), T, 0.0, {"plant.x": 1.5}, with_respect_to="plant.a")
+    assert np.array_equal(made.derivatives, same.derivatives)
+    with pytest.raises(nlctl.errors.UnknownKeywordError, match="'u' of sensitivity_response"):
+        nlctl.sensitivity_response(decay(), T, u=1.0, with_respect_to="plant.a")
+
+
+def test_at_a_bound():
+    """a = 2 is not within (0, 1): the search ends at 1, and the text says so."""
+    found = nlctl.fit(decay(), T, {"x": np.exp(-2 * T)}, {"plant.a": (0.5, 0.0, 1.0)}, 0.0, 1.0)
+    assert found.at_bounds == ("plant.a",)
+    assert "at a bound" in repr(found)
 
 
 def test_bounds_of_a_block():

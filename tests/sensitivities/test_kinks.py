@@ -1,5 +1,6 @@
 """Which choices jump: what both ways are where a condition switches."""
 
+import control as ct
 import numpy as np
 import pytest
 from closed_form_runs import block
@@ -39,3 +40,17 @@ def dead_zone(t, x, u, p):
 def test_jumps(law, count):
     """With a = m = 0.5, which may be other numbers in the next run."""
     assert jumps(law, {"a": 0.5, "m": 0.5}) == count
+
+
+def test_norm_at_0():
+    """r = |(x, y)| = a t: by a it is t, but for t = 0, where nothing else is lost."""
+    plant = ct.nlsys(
+        lambda t, x, u, p: [0.6 * p["a"], 0.8 * p["a"]],
+        lambda t, x, u, p: [np.sqrt(x[0] ** 2 + x[1] ** 2), x[0]], inputs=0, outputs=["r", "x"],
+        states=["x", "y"], params={"a": 2.0}, name="plant",
+    )  # fmt: skip
+    made = nlctl.sensitivity_response(plant, [0, 0.5, 1], with_respect_to="plant.a")
+    assert made.success
+    assert np.array_equal(np.isnan(made["r", "plant.a"]), [True, False, False])
+    assert np.allclose(made["r", "plant.a"][1:], [0.5, 1])
+    assert np.allclose(made["x", "plant.a"], [0, 0.3, 0.6])

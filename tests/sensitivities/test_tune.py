@@ -49,6 +49,16 @@ def test_where_two_margins_meet():
     assert np.all(np.diff(history["runs"]) >= 0)
 
 
+def test_short_names():
+    """X0 = [1] is {"plant.x": 1.0}; T and U are times and inputs."""
+    space, t = {"plant.a": (0.1, 10.0)}, np.linspace(0, 1, 501)
+    short = nlctl.tune(decay(), space, [small(), slow()], T=t, U=0.0, X0=[1.0], starts=1)
+    long = tuned(space, [small(), slow()], timepts=t, starts=1)
+    assert short["plant.a"] == long["plant.a"]
+    with pytest.raises(nlctl.errors.UnknownKeywordError, match="'u' of tune"):
+        nlctl.tune(decay(), space, [small()], u=0.0)
+
+
 def test_the_worst_of_several_samples_counts():
     """From x = 1, 2 and 3: 6 exp(-a) = a / 4, also with a space and a spec of studies."""
     best = float(lambertw(24.0).real)
