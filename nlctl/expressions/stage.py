@@ -130,6 +130,8 @@ class Stage:
             )
         if type(value) is np.ndarray:
             return self.fresh(value)
+        if type(value) is np.matrix:
+            return WRITTEN[np.matrix](self.graph, value)
         if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
             return value
         if isinstance(value, logging.Logger) or value is warnings.warn:
@@ -383,6 +385,8 @@ class Stage:
             return NumberType(np.float64, self._float64)
         if cls is np.errstate:
             return _errstate
+        if cls is np.matrix:
+            return staged.StagedType(cls, self)
         if cls is contextlib.suppress:
             return _suppress
         if cls is warnings.catch_warnings:
