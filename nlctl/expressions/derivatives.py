@@ -20,6 +20,7 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
+from .library.roots import Settled
 from .linear_systems import changed_solution, solution
 from .stage import Stage
 
@@ -39,6 +40,15 @@ def tangents(
 def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
     """Return what gives the partial derivatives of a function of the table, by argument."""
     return _Reader(graph, lambda _: None, {}).partial
+
+
+def slope(graph: Graph, result: Expr, number: Expr) -> Expr:
+    """Return the derivative of an expression by one that it is made of, all else fixed."""
+    reader = _Reader(graph, lambda _: None, {}, {number: graph.const(1.0)})
+    return reader.read([result])[0] or graph.const(0.0)
+
+
+Settled.slope = slope
 
 
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
