@@ -110,8 +110,8 @@ class Matrix(Computed):
         """Return it in another shape."""
         return self._as(self.A.reshape(*shape))
 
-    getA = lambda self: self.A  # noqa: E731, N815 (NumPy's name)
-    getA1 = lambda self: self.A1  # noqa: E731, N815
+    getA = lambda self: self.A  # noqa: E731 (NumPy's name)
+    getA1 = lambda self: self.A1  # noqa: E731
     transpose = lambda self: self.T  # noqa: E731
     ravel = lambda self: self._as(self.A.reshape(-1))  # noqa: E731
 

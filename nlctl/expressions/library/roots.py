@@ -36,7 +36,7 @@ def roots() -> dict[Any, Callable[..., Any]]:
 class Settled(Special):
     """Gives a root its slope: that of what is 0 there, not of passes that happen to end early."""
 
-    # A search that begins at the root ends at once: what it returns does not move with the function.
+    # A search that begins at the root ends at once: what it returns does not move with f.
     slope: ClassVar[Callable[[Graph, Expr, Expr], Expr]]  # see `derivatives`
 
     def __call__(self, f: Callable[..., Any], root: Any, args: Sequence[Any]) -> Any:
@@ -46,10 +46,12 @@ class Settled(Special):
         # a number of its own, whatever else is equal
         place = scalar(graph, graph.node("add", root.only, graph.const(-0.0)))
         value = traced(graph, f(place, *args))
-        if value.size != 1:
+        if value.shape:
             return root
         with in_passes(graph):
-            step = scalar(graph, value.only) / scalar(graph, Settled.slope(graph, value.only, place.only))
+            step = scalar(graph, value.only) / scalar(
+                graph, Settled.slope(graph, value.only, place.only)
+            )
             near = _ROUNDING * op("maximum", 1.0, op("absolute", place))
             return op("select", op("le", op("absolute", step), near), place - step, root)
 
