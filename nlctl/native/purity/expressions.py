@@ -181,8 +181,17 @@ class Expressions(ast.NodeVisitor):
     def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:
         """Note that a list or dict keeps what the call has not made: any other may be the same."""
         if base.holds and not all(v.own and v.inside for v in values):
-            names = self.frame.names
-            names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
+            self.walk.keeps += 1
+            self.lists_may_hold_others()
+
+    def lists_may_hold_others(self) -> None:
+        """Note that lists of the call, and of objects that it made, hold what it has not made."""
+        names = self.frame.names
+        names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
+        for thing in self.walk.objects:
+            for name, value in list(thing.attributes.items()):
+                if value.holds and value.inside and not isinstance(value.known, Instance):
+                    thing.learn(name, replace(value, inside=False))
 
     # expressions
 
@@ -403,14 +412,21 @@ class Expressions(ast.NodeVisitor):
             return self.parent_class()
         if function.known is getattr and isinstance(places[1].known, str):
             return self.attribute(places[0], places[1].known)
+        before = self.walk.keeps
         try:
             result = self.made_once(node, self.walk.call(function, given))
         except Message as message:
             message.place = f"{source_file(self.frame.function)}, line {node.lineno}"
             self.walk.messages.append(message)
             result = FRESH
-        for value in given.every:  # a list may have been given something to keep
-            self.kept(value, given.every)
+        called = function.known.choices if isinstance(function.known, OneOf) else (function,)
+        plain = [isinstance(f.known, FunctionType) and not library(f.known) for f in called]
+        reaches = any(v.holds for v in given.every) or not all(plain)
+        if self.walk.keeps > before and reaches:
+            self.lists_may_hold_others()
+        if not all(p or isinstance(f.known, Local) for p, f in zip(plain, called, strict=True)):
+            for value in given.every:  # a list may have been given something to keep
+                self.kept(value, given.every)
         return result
 
     def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
