@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Computed, Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
-from .table import WRITTEN, enter, unwrapped, written_out
+from .table import WRITTEN, enter, written_out
 
 __all__: list[str] = []
 
@@ -68,9 +68,8 @@ class Matrix(Computed):
         part = self.A[key]
         if not isinstance(part, Tracer):
             raise Untraceable("places of a matrix that are only known when it runs")
-        is_column = isinstance(key, tuple) and len(key) > 1 and np.ndim(unwrapped(key[1])) == 0
-        is_column = is_column and not isinstance(key[1], slice)
-        if part.ndim == 1 and is_column:
+        keys = list(key) if isinstance(key, tuple) else [key]
+        if part.ndim == 1 and len(keys) > 1 and not isinstance(keys[1], slice | list | np.ndarray):
             part = part.reshape(-1, 1)
         return self._as(part) if part.ndim else part
 
