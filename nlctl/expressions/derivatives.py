@@ -20,7 +20,7 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
-from .library.roots import Settled
+from .library.roots import SlopeOfRoot
 from .linear_systems import changed_solution, solution
 from .stage import Stage
 
@@ -42,13 +42,13 @@ def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
     return _Reader(graph, lambda _: None, {}).partial
 
 
-def slope(graph: Graph, result: Expr, number: Expr) -> Expr:
+def _slope(graph: Graph, result: Expr, number: Expr) -> Expr:
     """Return the derivative of an expression by one that it is made of, all else fixed."""
     reader = _Reader(graph, lambda _: None, {}, {number: graph.const(1.0)})
     return reader.read([result])[0] or graph.const(0.0)
 
 
-Settled.slope = slope
+SlopeOfRoot.slope = _slope
 
 
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:

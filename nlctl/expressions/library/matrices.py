@@ -17,7 +17,7 @@ __all__: list[str] = []
 _TWO = ("add", "sub", "mul", "div")
 
 
-class Matrix(Computed):
+class NumpyMatrix(Computed):
     """A matrix: what NumPy makes of one is a matrix, too, or it is refused."""
 
     def __init__(self, graph: Graph, array: Tracer) -> None:
@@ -34,34 +34,34 @@ class Matrix(Computed):
     A1 = property(lambda self: self.A.reshape(-1))
     I = property(lambda self: self._as(_inverse(self.graph, self.A)))  # noqa: E741 (NumPy's name)
 
-    def _as(self, array: Any) -> Matrix:
-        return Matrix(self.graph, array)
+    def _as(self, array: Any) -> NumpyMatrix:
+        return NumpyMatrix(self.graph, array)
 
     def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Any:
         """Return an operation by its name, element by element, as functions of NumPy have it."""
         if name not in _TWO and len(operands) > 1:
             raise Untraceable(f"{name} of matrices")
-        return self._as(elementwise(graph, name, *map(opened, operands)))
+        return self._as(elementwise(graph, name, *map(_opened, operands)))
 
-    def __mul__(self, other: Any) -> Matrix:
+    def __mul__(self, other: Any) -> NumpyMatrix:
         if _is_number(other):
             return self._as(elementwise(self.graph, "mul", self.A, other))
-        return self._as(product(self.A, matrix(self.graph, other).A))
+        return self._as(product(self.A, _matrix(self.graph, other).A))
 
-    def __rmul__(self, other: Any) -> Matrix:
+    def __rmul__(self, other: Any) -> NumpyMatrix:
         if _is_number(other):
             return self * other
-        return self._as(product(traced(self.graph, opened(other)), self.A))
+        return self._as(product(traced(self.graph, _opened(other)), self.A))
 
     dot = __mul__
 
-    def __matmul__(self, other: Any) -> Matrix:
-        return self._as(product(self.A, traced(self.graph, opened(other))))
+    def __matmul__(self, other: Any) -> NumpyMatrix:
+        return self._as(product(self.A, traced(self.graph, _opened(other))))
 
-    def __rmatmul__(self, other: Any) -> Matrix:
-        return self._as(product(traced(self.graph, opened(other)), self.A))
+    def __rmatmul__(self, other: Any) -> NumpyMatrix:
+        return self._as(product(traced(self.graph, _opened(other)), self.A))
 
-    def __pow__(self, exponent: int) -> Matrix:
+    def __pow__(self, exponent: int) -> NumpyMatrix:
         return self._as(written_out(self.graph, np.linalg.matrix_power, self.A, exponent))
 
     def __getitem__(self, key: Any) -> Any:
@@ -74,10 +74,10 @@ class Matrix(Computed):
         return self._as(part) if part.ndim else part
 
     def __setitem__(self, key: Any, value: Any) -> None:
-        value = traced(self.graph, opened(value))
+        value = traced(self.graph, _opened(value))
         self.A[key] = value.reshape(self.A[key].shape) if value.shape else value
 
-    def __iter__(self) -> Iterator[Matrix]:
+    def __iter__(self) -> Iterator[NumpyMatrix]:
         return (self[i] for i in range(len(self.A)))
 
     def __len__(self) -> int:
@@ -93,7 +93,7 @@ class Matrix(Computed):
         """Return one element."""
         return self.A.reshape(-1)[place[0] if place else 0] if len(place) < 2 else self.A[place]
 
-    def copy(self) -> Matrix:
+    def copy(self) -> NumpyMatrix:
         """Return a copy."""
         return self._as(self.A.copy())
 
@@ -101,11 +101,11 @@ class Matrix(Computed):
         """Return lists of the elements."""
         return [list(row) for row in self.A]
 
-    def flatten(self) -> Matrix:
+    def flatten(self) -> NumpyMatrix:
         """Return a copy in one row."""
         return self._as(self.A.flatten())
 
-    def reshape(self, *shape: Any) -> Matrix:
+    def reshape(self, *shape: Any) -> NumpyMatrix:
         """Return it in another shape."""
         return self._as(self.A.reshape(*shape))
 
@@ -121,9 +121,9 @@ class Matrix(Computed):
     __lt__ = __le__ = __gt__ = __ge__ = _asked
 
 
-def opened(value: Any) -> Any:
+def _opened(value: Any) -> Any:
     """Return a matrix as the array that it has, anything else as it is."""
-    return value.A if isinstance(value, Matrix) else value
+    return value.A if isinstance(value, NumpyMatrix) else value
 
 
 def _is_number(value: Any) -> bool:
@@ -137,13 +137,13 @@ def _inverse(graph: Graph, array: Tracer) -> Any:
     return WRITTEN[name](graph, array)
 
 
-def matrix(graph: Graph, data: Any, dtype: Any = None, copy: bool = True) -> Matrix:
+def _matrix(graph: Graph, data: Any, dtype: Any = None, copy: bool = True) -> NumpyMatrix:
     """Return ``np.matrix`` of numbers, lists, arrays, or a text."""
     if isinstance(data, str):
         data = np.array(np.matrix(data))
-    data = np.array(data) if isinstance(data, np.matrix) else opened(data)
+    data = np.array(data) if isinstance(data, np.matrix) else _opened(data)
     array: Any = WRITTEN[np.array if copy else np.asarray](graph, data, dtype)
-    return Matrix(graph, traced(graph, array))
+    return NumpyMatrix(graph, traced(graph, array))
 
 
 def _of_matrices(function: Any) -> Callable[..., Any]:
@@ -153,18 +153,20 @@ def _of_matrices(function: Any) -> Callable[..., Any]:
     def of_arrays(graph: Graph, *given: Any, **named: Any) -> Any:
         parts = [v for value in given for v in (value if isinstance(value, list | tuple) else
                                                 [value])]  # fmt: skip
-        if not any(isinstance(v, Matrix) for v in parts):
+        if not any(isinstance(v, NumpyMatrix) for v in parts):
             return written(graph, *given, **named)
-        arrays = [type(v)(map(opened, v)) if type(v) in (list, tuple) else opened(v) for v in given]
-        return Matrix(graph, traced(graph, written(graph, *arrays, **named)))
+        arrays = [
+            type(v)(map(_opened, v)) if type(v) in (list, tuple) else _opened(v) for v in given
+        ]
+        return NumpyMatrix(graph, traced(graph, written(graph, *arrays, **named)))
 
     return of_arrays
 
 
 def _solved(graph: Graph, a: Any, b: Any) -> Any:
     """Return the solution of equations: a matrix where the right-hand side is one."""
-    solution = _SOLVE(graph, opened(a), opened(b))
-    return Matrix(graph, solution) if isinstance(b, Matrix) else solution
+    solution = _SOLVE(graph, _opened(a), _opened(b))
+    return NumpyMatrix(graph, solution) if isinstance(b, NumpyMatrix) else solution
 
 
 _SOLVE = WRITTEN[np.linalg.solve]
@@ -174,13 +176,13 @@ for _function in (np.linalg.inv, np.linalg.pinv, np.transpose, np.concatenate, n
     enter([_function], _of_matrices(_function))
 for _function in (np.array, np.asarray, np.linalg.det, np.trace, np.ravel, np.linalg.norm):
     _plain = WRITTEN[_function]
-    _of = lambda graph, a, *rest, _plain=_plain, **named: _plain(graph, opened(a), *rest, **named)  # noqa: E731
+    _of = lambda graph, a, *rest, _plain=_plain, **named: _plain(graph, _opened(a), *rest, **named)  # noqa: E731
     enter([_function], _of)
-enter([np.matrix], matrix, makes=True)
+enter([np.matrix], _matrix, makes=True)
 enter(
     [np.asmatrix],
     lambda graph, data, dtype=None: (
-        data if isinstance(data, Matrix) else matrix(graph, data, dtype, copy=False)
+        data if isinstance(data, NumpyMatrix) else _matrix(graph, data, dtype, copy=False)
     ),
     makes=True,
 )

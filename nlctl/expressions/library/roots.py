@@ -33,7 +33,7 @@ def roots() -> dict[Any, Callable[..., Any]]:
     }  # fmt: skip
 
 
-class Settled(Special):
+class SlopeOfRoot(Special):
     """Gives a root its slope: that of what is 0 there, not of passes that happen to end early."""
 
     # A search that begins at the root ends at once: what it returns does not move with f.
@@ -50,13 +50,13 @@ class Settled(Special):
             return root
         with in_passes(graph):
             step = scalar(graph, value.only) / scalar(
-                graph, Settled.slope(graph, value.only, place.only)
+                graph, SlopeOfRoot.slope(graph, value.only, place.only)
             )
             near = _ROUNDING * op("maximum", 1.0, op("absolute", place))
             return op("select", op("le", op("absolute", step), near), place - step, root)
 
 
-settled = Settled()
+with_slope = SlopeOfRoot()
 
 
 class Root:
@@ -93,7 +93,7 @@ def root_scalar(
 
 def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
     """Return a root between two places with values of opposite signs, by Brent's method."""
-    return settled(f, _by_brent(f, a, b, args, xtol, rtol, maxiter), args)
+    return with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter), args)
 
 
 def _by_brent(f, a, b, args, xtol, rtol, maxiter):
@@ -153,14 +153,14 @@ def newton(func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, rtol=0.0, x1
     """Return a root near a place, by Newton's method or that of secants."""
     if fprime is not None:
         root = _tangents(func, np.multiply(1.0, x0), fprime, args, tol, maxiter, rtol)
-        return settled(func, root, args)
+        return with_slope(func, root, args)
     p0 = np.multiply(1.0, x0)
     if x1 is None:
         p1 = p0 * (1 + 1e-4)
         p1 = np.where(p1 >= 0, p1 + 1e-4, p1 - 1e-4)
     else:
         p1 = np.multiply(1.0, x1)
-    return settled(func, _secants(func, p0, p1, args, tol, maxiter, rtol), args)
+    return with_slope(func, _secants(func, p0, p1, args, tol, maxiter, rtol), args)
 
 
 def _tangents(func, p0, fprime, args, tol, maxiter, rtol):

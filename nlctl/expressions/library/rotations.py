@@ -168,7 +168,7 @@ def from_rotvec(graph: Graph, rotvec: object, degrees: bool = False) -> Turn:
     if degrees:
         parts = [v * (math.pi / 180.0) for v in parts]
     square = sum((v * v for v in parts[1:]), parts[0] * parts[0])
-    angle = op("sqrt", square)  # without a slope at 0: there only the square is looked at
+    angle = op("sqrt", square)  # without a slope at 0: there the square alone counts
     is_small = op("le", angle, SMALL_ANGLE)
     series = 0.5 - square / 48.0 + square * square / 3840.0
     scale = op("select", is_small, series, op("sin", angle / 2.0) / angle)

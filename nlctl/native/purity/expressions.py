@@ -17,7 +17,7 @@ from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
-from .parts import part_of, part_of_one, part_of_row
+from .parts import part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
     OUTSIDE,
@@ -135,7 +135,7 @@ class Expressions(ast.NodeVisitor):
             self.iterated(value)
             is_open = any(isinstance(part, ast.Starred) for part in target.elts)
             for i, part in enumerate(target.elts):
-                single = element(value) if is_open else part_of(value, i, len(target.elts))
+                single = element(value) if is_open else part_at(value, i, len(target.elts))
                 self.bind(part, value if isinstance(part, ast.Starred) else single)
         elif isinstance(target, ast.Starred):
             self.bind(target.value, holder([element(value)]))

@@ -24,7 +24,7 @@ from .values import (
 )
 
 
-def part_of(value: KnownValue, i: int, count: int) -> KnownValue:
+def part_at(value: KnownValue, i: int, count: int) -> KnownValue:
     """Return what is known of one part of what is taken apart."""
     known = value.known
     if isinstance(known, RowOf):
