@@ -20,6 +20,7 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
+from .library.roots import SlopeOfRoot
 from .linear_systems import changed_solution, solution
 from .stage import Stage
 
@@ -39,6 +40,15 @@ def tangents(
 def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
     """Return what gives the partial derivatives of a function of the table, by argument."""
     return _Reader(graph, lambda _: None, {}).partial
+
+
+def _slope(graph: Graph, result: Expr, number: Expr) -> Expr:
+    """Return the derivative of an expression by one that it is made of, all else fixed."""
+    reader = _Reader(graph, lambda _: None, {}, {number: graph.const(1.0)})
+    return reader.read([result])[0] or graph.const(0.0)
+
+
+SlopeOfRoot.slope = _slope
 
 
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
@@ -67,6 +77,26 @@ def _sum(graph: Graph, a: Expr | None, b: Expr | None) -> Expr | None:
 
 def _difference(graph: Graph, a: Expr | None, b: Expr | None) -> Expr:
     return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or graph.const(0.0))
+
+
+def _times(graph: Graph, a: Expr, b: Expr) -> Expr:
+    """Return a product; where a factor is chosen to be 0 it is 0, however large the other is."""
+    # sqrt(max(x, 0)) stands still where x is below 0, as steep as the root is there.
+    product = lambda p: _unless_zero(graph, b, lambda q: graph.op("mul", p, q))  # noqa: E731
+    return _unless_zero(graph, a, product)
+
+
+def _unless_zero(graph: Graph, part: Expr, of: Callable[[Expr], Expr]) -> Expr:
+    """Return what is made of a part, 0 where that is chosen to be 0."""
+    if part.op != "select" or not any(map(_is_zero, part.args[1:])):
+        return of(part)
+    condition, *ways = part.args
+    results = (way if _is_zero(way) else _unless_zero(graph, way, of) for way in ways)
+    return graph.op("select", condition, *results)
+
+
+def _is_zero(expr: Expr) -> bool:
+    return expr.op == "const" and expr.data == 0.0
 
 
 _LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum", "lu")
@@ -144,14 +174,14 @@ class _Reader:
         return self.graph.const(0.0)
 
     def _mul(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
-        left = self.graph.op("mul", a, node.args[1]) if a else None
-        right = self.graph.op("mul", node.args[0], b) if b else None
+        left = _times(self.graph, a, node.args[1]) if a else None
+        right = _times(self.graph, node.args[0], b) if b else None
         return _sum(self.graph, left, right)
 
     def _div(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr:
         """(a / b)' = (a' - (a / b) b') / b."""
         change = _difference(self.graph, a, self.graph.op("mul", node, b) if b else None)
-        return self.graph.op("div", change, node.args[1])
+        return _unless_zero(self.graph, change, lambda p: self.graph.op("div", p, node.args[1]))
 
     def _select(self, node: Expr, _: Expr | None, a: Expr | None, b: Expr | None) -> Expr:
         return self.graph.op("select", node.args[0], a or self._zero, b or self._zero)
@@ -177,7 +207,7 @@ class _Reader:
         change: Expr | None = None
         for i, part in enumerate(parts):
             if part is not None:
-                term = self.graph.op("mul", self.partial(node, i), part)
+                term = _times(self.graph, self.partial(node, i), part)
                 change = self.graph.op("add", change, term) if change else term
         return change
 

@@ -12,7 +12,7 @@ import numpy as np
 from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
 from .graph import Graph, Untraceable
 from .masked import Masked, MaskedPlaces
-from .operators import elementwise, integer_range
+from .operators import elementwise, integer_range, mapped_cells
 
 GATHERED = 64  # places among which an integer may choose
 
@@ -145,8 +145,7 @@ def _assign(self: Tracer, key: Any, value: object) -> None:
     place = _open_place(key)
     if place is not None:
         return _scattered(self, key, place, value)
-    value = traced(self.graph, value)
-    _check_kinds(self, value)
+    value = _in_its_kind(self, traced(self.graph, value))
     if self.watched:
         raise Untraceable("assignment to another shape of an array")
     if holds_arrays(key):
@@ -188,11 +187,14 @@ def _assign_at(self: Tracer, key: Any, value: Tracer) -> None:
         self.values, self.version = as_array(joined), self.version + 1
 
 
-def _check_kinds(self: Tracer, value: Tracer) -> None:
-    """Check that an assignment rounds nothing: arrays of truth values take no others."""
-    kinds = {e.kind for e in self.values.flat}
-    if kinds and "f" not in kinds and {e.kind for e in value.cells.flat} != kinds:
+def _in_its_kind(self: Tracer, value: Tracer) -> Tracer:
+    """Return a value as an array takes it: one of floats as floats, others take no others."""
+    kinds, given = ({e.kind for e in array.cells.flat} for array in (self, value))
+    if kinds == {"f"} and given != kinds:
+        return mapped_cells(value, self.graph.number)
+    if kinds and "f" not in kinds and given != kinds:
         raise Untraceable("assignment to an array of integers or truth values")
+    return value
 
 
 def _assign_to_part(self: Tracer, key: object, value: Tracer) -> None:

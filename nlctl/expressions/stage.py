@@ -31,7 +31,7 @@ from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .gains import computes_gains
 from .graph import Graph, Untraceable, numpy_function
-from .library.creation import Joined
+from .library.creation import Joined, whole_numbers
 from .library.linear_maps import enter_linear_maps
 from .library.python import NUMBER_SAMPLES, Builtins, of_math
 from .library.roots import roots
@@ -130,6 +130,8 @@ class Stage:
             )
         if type(value) is np.ndarray:
             return self.fresh(value)
+        if type(value) is np.matrix:
+            return WRITTEN[np.matrix](self.graph, value)
         if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
             return value
         if isinstance(value, logging.Logger) or value is warnings.warn:
@@ -381,8 +383,12 @@ class Stage:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
         if cls is np.float64:
             return NumberType(np.float64, self._float64)
+        if cls is np.int64:
+            return NumberType(np.int64, self._int64)
         if cls is np.errstate:
             return _errstate
+        if cls is np.matrix:
+            return staged.StagedType(cls, self)
         if cls is contextlib.suppress:
             return _suppress
         if cls is warnings.catch_warnings:
@@ -416,6 +422,11 @@ class Stage:
         of_floats: Any = self._builtins["float"]
         number = of_floats.make(value)
         return scalar(self.graph, number.only) if isinstance(number, Tracer) else np.float64(number)
+
+    def _int64(self, value: Any = 0) -> Any:
+        """Return the integer that NumPy makes of a number."""
+        is_traced = isinstance(value, Tracer)
+        return whole_numbers(self.graph, value) if is_traced else np.int64(value)
 
     def copied_class(self, cls: type) -> type:
         """Return a copy of a class whose methods lead to the stage."""

@@ -120,7 +120,9 @@ class StagedType:
 
     def __call__(self, *arguments: object, **options: object) -> Any:
         written, given = WRITTEN.get(self._real), [*arguments, *options.values()]
-        if written is not None and (self._real is np.vectorize or holds_tracers(given)):
+        if written is not None and (
+            self._real in (np.vectorize, np.matrix) or holds_tracers(given)
+        ):
             return written(self._stage.graph, *arguments, **options)
         return self._stage.for_numbers(self._real)(*arguments, **options)
 

@@ -9,12 +9,17 @@ Source: `scipy/optimize/Zeros/brentq.c`, `bisect.c`, `scipy/optimize/_zeros_py.p
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ..graph import Untraceable
+from ..arrays import Special, Tracer, scalar, traced
+from ..graph import Expr, Graph, Untraceable
+from ..operators import elementwise
+from .rotated import in_passes
+
+_ROUNDING = 1e-15  # relative to the larger of 1 and the root
 
 
 @functools.cache
@@ -26,6 +31,32 @@ def roots() -> dict[Any, Callable[..., Any]]:
         optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton,
         optimize.root_scalar: root_scalar,
     }  # fmt: skip
+
+
+class SlopeOfRoot(Special):
+    """Gives a root its slope: that of what is 0 there, not of passes that happen to end early."""
+
+    # A search that begins at the root ends at once: what it returns does not move with f.
+    slope: ClassVar[Callable[[Graph, Expr, Expr], Expr]]  # see `derivatives`
+
+    def __call__(self, f: Callable[..., Any], root: Any, args: Sequence[Any]) -> Any:
+        if not isinstance(root, Tracer) or root.shape or root.only.op == "const":
+            return root
+        graph, op = root.graph, functools.partial(elementwise, root.graph)
+        # a number of its own, whatever else is equal
+        place = scalar(graph, graph.node("add", root.only, graph.const(-0.0)))
+        value = traced(graph, f(place, *args))
+        if value.shape:
+            return root
+        with in_passes(graph):
+            step = scalar(graph, value.only) / scalar(
+                graph, SlopeOfRoot.slope(graph, value.only, place.only)
+            )
+            near = _ROUNDING * op("maximum", 1.0, op("absolute", place))
+            return op("select", op("le", op("absolute", step), near), place - step, root)
+
+
+with_slope = SlopeOfRoot()
 
 
 class Root:
@@ -62,6 +93,10 @@ def root_scalar(
 
 def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
     """Return a root between two places with values of opposite signs, by Brent's method."""
+    return with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter), args)
+
+
+def _by_brent(f, a, b, args, xtol, rtol, maxiter):
     xpre, xcur = np.multiply(1.0, a), np.multiply(1.0, b)  # in C nothing raises errors
     fpre, fcur = f(xpre, *args), f(xcur, *args)
     if fpre * fcur > 0:
@@ -117,14 +152,15 @@ def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
 def newton(func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, rtol=0.0, x1=None):
     """Return a root near a place, by Newton's method or that of secants."""
     if fprime is not None:
-        return _tangents(func, np.multiply(1.0, x0), fprime, args, tol, maxiter, rtol)
+        root = _tangents(func, np.multiply(1.0, x0), fprime, args, tol, maxiter, rtol)
+        return with_slope(func, root, args)
     p0 = np.multiply(1.0, x0)
     if x1 is None:
         p1 = p0 * (1 + 1e-4)
         p1 = np.where(p1 >= 0, p1 + 1e-4, p1 - 1e-4)
     else:
         p1 = np.multiply(1.0, x1)
-    return _secants(func, p0, p1, args, tol, maxiter, rtol)
+    return with_slope(func, _secants(func, p0, p1, args, tol, maxiter, rtol), args)
 
 
 def _tangents(func, p0, fprime, args, tol, maxiter, rtol):

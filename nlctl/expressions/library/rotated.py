@@ -23,7 +23,7 @@ _SWEEPS, _MOST = 6, 5
 
 
 @contextmanager
-def _in_passes(graph: Graph) -> Iterator[None]:
+def in_passes(graph: Graph) -> Iterator[None]:
     """Note that nothing inside is located: whichever way a rotation goes, the values are equal."""
     place, computed = len(graph.passing), set[Any]()
     graph.passing.append(computed)
@@ -52,7 +52,7 @@ def symmetric_by_rotations(graph: Graph, matrix: Any) -> Tracer:
     """Return the eigenvalues of a symmetric matrix, of which the lower half is read, in order."""
     count, np_ = len(matrix), Facade(graph)
     a = {(i, j): matrix[max(i, j), min(i, j)] for i in range(count) for j in range(count)}
-    with _in_passes(graph):
+    with in_passes(graph):
         for p, q in _pairs(count):
             sine, cosine = _rotation(np_, a[q, q] - a[p, p], a[p, q])
             moved = sine / cosine * a[p, q]
@@ -68,7 +68,7 @@ def symmetric_by_rotations(graph: Graph, matrix: Any) -> Tracer:
 def singular_by_rotations(graph: Graph, matrix: Any) -> Tracer:
     """Return the singular values of a matrix, the largest one first."""
     columns, np_ = list(matrix.T if matrix.shape[0] >= matrix.shape[1] else matrix), Facade(graph)
-    with _in_passes(graph):
+    with in_passes(graph):
         for p, q in _pairs(len(columns)):
             one, other = columns[p], columns[q]
             apart = np_.sum(other * other) - np_.sum(one * one)

@@ -79,10 +79,11 @@ class Turn(Special):
     def as_rotvec(self, degrees: bool = False) -> Tracer:
         """Return the axis, as long as the angle."""
         op = functools.partial(elementwise, self.graph)
-        w = self.quat[3]
+        x, y, z, w = self.quat
         sign = op("select", op("lt", w, 0.0), -1.0, 1.0)
         angle = 2.0 * op("arctan2", self._length(), sign * w)
-        square = angle * angle
+        least = x * x + y * y + z * z  # arcsin by its series: the root has no slope at 0
+        square = 4.0 * least * (1.0 + least / 3.0 + 8.0 * least * least / 45.0)
         series = 2.0 + square / 12.0 + 7.0 * square * square / 2880.0
         scale = op("select", op("le", angle, SMALL_ANGLE), series, angle / op("sin", angle / 2.0))
         factor = scale * sign * (180.0 / math.pi if degrees else 1.0)
@@ -166,11 +167,14 @@ def from_rotvec(graph: Graph, rotvec: object, degrees: bool = False) -> Turn:
     parts = _numbers(graph, rotvec, 3)
     if degrees:
         parts = [v * (math.pi / 180.0) for v in parts]
-    angle = op("sqrt", sum((v * v for v in parts[1:]), parts[0] * parts[0]))
-    square = angle * angle
+    square = sum((v * v for v in parts[1:]), parts[0] * parts[0])
+    angle = op("sqrt", square)  # without a slope at 0: there the square alone counts
+    is_small = op("le", angle, SMALL_ANGLE)
     series = 0.5 - square / 48.0 + square * square / 3840.0
-    scale = op("select", op("le", angle, SMALL_ANGLE), series, op("sin", angle / 2.0) / angle)
-    return Turn(graph, [*(scale * v for v in parts), op("cos", angle / 2.0)])
+    scale = op("select", is_small, series, op("sin", angle / 2.0) / angle)
+    cosine = 1.0 - square / 8.0 + square * square / 384.0
+    cosine = op("select", is_small, cosine, op("cos", angle / 2.0))
+    return Turn(graph, [*(scale * v for v in parts), cosine])
 
 
 def from_euler(graph: Graph, seq: str, angles: object, degrees: bool = False) -> Turn:

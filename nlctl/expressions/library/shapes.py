@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -96,6 +97,17 @@ for _function in _MOVING:
     enter([_function], by_moving(_function), makes=_function in (np.diag, np.tile, np.diagflat))
 for _function in _COMPUTING:
     enter([_function], by_numpy(_function))
+
+
+_POLYVAL = by_numpy(np.polyval)
+
+
+@of(np.polyval)
+def _polyval(graph: Graph, p: Any, x: Any) -> Any:
+    """Return a polynomial at numbers, which may be complex."""
+    if not holds_complex(x) or isinstance(x, list | tuple):
+        return _POLYVAL(graph, p, x)
+    return functools.reduce(lambda y, c: y * x + c, list(traced(graph, p)), 0.0 * x)
 
 
 @of(np.block)

@@ -82,6 +82,7 @@ class FunctionWalk(Walk):
     def __init__(self) -> None:
         super().__init__()
         self.done: dict[Any, KnownValue] = {}
+        self.keeping: set[Any] = set()  # of these, what puts something into lists
         self.walked: set[ast.AST] = set()  # functions inside others, while they are walked
         self.bodies = 0
 
@@ -136,8 +137,12 @@ class FunctionWalk(Walk):
             return result
         key = (node, function, *frame.names.items())
         if key not in self.done:
+            before = self.keeps
             self.done[key] = OUTSIDE  # while it is being walked: it may call itself
             self.done[key] = CallWalker(self, frame).result(node)
+            self.keeping |= {key} if self.keeps > before else set()
+        elif key in self.keeping:
+            self.keeps += 1
         return self.done[key]
 
 

@@ -17,6 +17,7 @@ from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
+from .parts import part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
     OUTSIDE,
@@ -43,6 +44,7 @@ from .values import (
     holder,
     least_upper_bound,
     library,
+    row,
 )
 from .walk import Walk
 
@@ -131,10 +133,12 @@ class Expressions(ast.NodeVisitor):
             self.assign(target.id, value)
         elif isinstance(target, ast.Tuple | ast.List):
             self.iterated(value)
+            is_open = any(isinstance(part, ast.Starred) for part in target.elts)
             for i, part in enumerate(target.elts):
-                self.bind(part, _part(value, i, len(target.elts)))
+                single = element(value) if is_open else part_at(value, i, len(target.elts))
+                self.bind(part, value if isinstance(part, ast.Starred) else single)
         elif isinstance(target, ast.Starred):
-            self.bind(target.value, replace(element(value), own=True, holds=True))
+            self.bind(target.value, holder([element(value)]))
         elif isinstance(target, ast.Subscript | ast.Attribute):
             self.write(target, value)
         else:
@@ -144,9 +148,12 @@ class Expressions(ast.NodeVisitor):
         base = self.visit(target.value)
         if isinstance(target, ast.Subscript):
             self.visit(target.slice)
-        if isinstance(base.known, Instance):
-            return self.write_object(target, base, value)
-        if isinstance(base.known, ListOf | OneOf | enum.Enum):
+        objects = base.known.choices if isinstance(base.known, OneOf) else (base,)
+        if all(isinstance(thing.known, Instance) for thing in objects):
+            for thing in objects:
+                self.write_object(target, thing, value)
+            return
+        if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
         if not base.own:
             text = ast.unparse(target.value)
@@ -174,8 +181,17 @@ class Expressions(ast.NodeVisitor):
     def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:
         """Note that a list or dict keeps what the call has not made: any other may be the same."""
         if base.holds and not all(v.own and v.inside for v in values):
-            names = self.frame.names
-            names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
+            self.walk.keeps += 1
+            self.lists_may_hold_others()
+
+    def lists_may_hold_others(self) -> None:
+        """Note that lists of the call, and of objects that it made, hold what it has not made."""
+        names = self.frame.names
+        names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
+        for thing in self.walk.objects:
+            for name, value in list(thing.attributes.items()):
+                if value.holds and value.inside and not isinstance(value.known, Instance):
+                    thing.learn(name, replace(value, inside=False))
 
     # expressions
 
@@ -266,7 +282,10 @@ class Expressions(ast.NodeVisitor):
         return least_upper_bound([self.visit(node.body), self.visit(node.orelse)])
 
     def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> KnownValue:
-        return holder([self.visit(part) for part in node.elts])
+        is_row = isinstance(node, ast.Tuple) and not any(
+            isinstance(part, ast.Starred) for part in node.elts
+        )
+        return (row if is_row else holder)([self.visit(part) for part in node.elts])
 
     visit_List = visit_Set = visit_Tuple
 
@@ -303,9 +322,9 @@ class Expressions(ast.NodeVisitor):
             slices = any(isinstance(key, slice) for key in keys)
             return base if slices else element(base)
         if isinstance(base.known, RowOf):
-            return least_upper_bound(base.known.parts)
+            return part_of_row(base, keys[0])
         if isinstance(base.known, OneOf):
-            return _of_one(base, keys)
+            return part_of_one(base, keys)
         getter = made.operator_of(self.walk, base, "__getitem__")
         if getter is not None:
             return self.walk.function(getter, Given((base, *values[:1])))
@@ -341,7 +360,7 @@ class Expressions(ast.NodeVisitor):
             return replace(base, own=base.inside)
         if isinstance(thing, Instance):
             return made.attribute(self.walk, base, name)
-        if isinstance(thing, ListOf):
+        if isinstance(thing, ListOf | RowOf):
             raise Impure(f"reads '.{name}' of a list of functions or objects", "take one of them")
         if isinstance(thing, Parent):
             return made.of_parent(self.walk, thing, name)
@@ -393,14 +412,21 @@ class Expressions(ast.NodeVisitor):
             return self.parent_class()
         if function.known is getattr and isinstance(places[1].known, str):
             return self.attribute(places[0], places[1].known)
+        before = self.walk.keeps
         try:
             result = self.made_once(node, self.walk.call(function, given))
         except Message as message:
             message.place = f"{source_file(self.frame.function)}, line {node.lineno}"
             self.walk.messages.append(message)
             result = FRESH
-        for value in given.every:  # a list may have been given something to keep
-            self.kept(value, given.every)
+        called = function.known.choices if isinstance(function.known, OneOf) else (function,)
+        plain = [isinstance(f.known, FunctionType) and not library(f.known) for f in called]
+        reaches = any(v.holds for v in given.every) or not all(plain)
+        if self.walk.keeps > before and reaches:
+            self.lists_may_hold_others()
+        if not all(p or isinstance(f.known, Local) for p, f in zip(plain, called, strict=True)):
+            for value in given.every:  # a list may have been given something to keep
+                self.kept(value, given.every)
         return result
 
     def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
@@ -453,35 +479,6 @@ class Expressions(ast.NodeVisitor):
         # whatever is in a list is only handed on
         if not isinstance(value.known, ListOf) and not known_calls.iterates(self.walk, value):
             known_calls.check_object(value, "goes through")
-
-
-def _part(value: KnownValue, i: int, count: int) -> KnownValue:
-    """Return what is known of one part of what is taken apart."""
-    known = value.known
-    if isinstance(known, RowOf):
-        return known.parts[i] if len(known.parts) == count else OUTSIDE
-    choices = known.choices if isinstance(known, OneOf) else (value,)
-    rows = [c.known for c in choices]
-    if all(isinstance(row, list | tuple) and len(row) == count for row in rows):
-        column = [row[i] for row in rows]
-        if all(isinstance(part, (*PLAIN, np.ndarray)) for part in column):
-            return replace(element(value), known=UNKNOWN_VALUE)
-        whole = least_upper_bound([captured(part) for part in column])
-        is_open = isinstance(whole.known, Unknown)
-        return replace(whole, known=choice_among(column)) if is_open else whole
-    return element(value)
-
-
-def _of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
-    """Return what is known of an element of one of several lists, or of one of several dicts."""
-    known = [choice.known for choice in base.known.choices]
-    if all(isinstance(thing, dict) for thing in known):
-        key, inside = keys[0], KnownValue(base.inside, base.inside, True)
-        if len(keys) > 1 or not isinstance(key, PLAIN):
-            return inside
-        parts = [captured(thing[key]) for thing in known if key in thing]
-        return least_upper_bound(parts) if parts else inside
-    return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
 
 
 def _is_plain_attribute(thing: object, name: str) -> bool:

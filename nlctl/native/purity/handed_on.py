@@ -35,10 +35,11 @@ _ZIPPED = ("product", "zip_longest")
 def _functions_in(given: Sequence[KnownValue]) -> Any:
     """Return the choice between the functions in what is gone through, for what calls one."""
     parts = [element(v) for v in given]
-    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
+    kinds = OneOf | RowOf | Instance | Bound | Cached | Local | FunctionType
     functions = [v for v in parts if isinstance(v.known, kinds)]
     functions = [
-        v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
+        v if isinstance(v.known, OneOf | RowOf) else replace(v, known=OneOf((v,)))
+        for v in functions
     ]
     return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
 

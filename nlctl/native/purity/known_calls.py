@@ -51,6 +51,7 @@ from .values import (
     least_upper_bound,
     library,
     python_function,
+    row,
 )
 from .walk import Walk
 
@@ -280,8 +281,10 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
 
 def _of_list(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of the result of a method of a list or dict of functions."""
-    if name in ("values", "items", "copy"):
+    if name in ("values", "copy"):
         return base
+    if name == "items":
+        return holder([row([FRESH, element(base)])])
     if name == "get":
         return least_upper_bound([element(base), *given[1:]])
     if name in ("keys", "index", "count"):

@@ -38,7 +38,7 @@ _NEUTRAL = (object, Generic, Protocol, abc.ABC)
 def instance(walk: Walk, cls: type, given: Given) -> KnownValue:
     """Return what is known of a new object of somebody's class."""
     _check_plain(cls)
-    new = Instance(cls)
+    new = walk.new_object(cls)
     value = KnownValue(True, True, True, known=new)
     start = inspect.getattr_static(cls, "__init__", None)
     if dataclasses.is_dataclass(cls) and _is_generated(start):

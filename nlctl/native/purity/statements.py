@@ -322,7 +322,8 @@ def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]
     """Return what is assigned to what where both sides are written out, otherwise nothing."""
     if not (isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)):
         return []
-    fits = len(target.elts) == len(value.elts)
+    is_open = any(isinstance(part, ast.Starred) for part in (*target.elts, *value.elts))
+    fits = len(target.elts) == len(value.elts) and not is_open
     return list(zip(target.elts, value.elts, strict=True)) if fits else []
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import EnumType, Flag
 from types import FunctionType, MethodType, ModuleType
@@ -64,7 +64,7 @@ class ListOf:
 
 @dataclass(frozen=True)
 class RowOf:
-    """What `zip` or `enumerate` makes of one of several objects or functions and others."""
+    """A tuple, in its order, of objects or functions and others, as `zip` makes them, too."""
 
     parts: tuple[KnownValue, ...]
 
@@ -207,9 +207,25 @@ def _of_any(values: list[KnownValue]) -> Any:
         for value in values[1:]:
             first.absorb(value.known)
         return first
+    if all(isinstance(v.known, RowOf) and len(v.known.parts) == _width(first) for v in values):
+        columns = zip(*(v.known.parts for v in values), strict=True)
+        return RowOf(tuple(map(least_upper_bound, columns)))
     if all(isinstance(v.known, ListOf) for v in values):
         return ListOf(tuple(dict.fromkeys(c for v in values for c in v.known.choices)))
     return function_choice(values)
+
+
+def _width(row: Any) -> int:
+    return len(row.parts) if isinstance(row, RowOf) else -1
+
+
+def row(values: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of a tuple of these."""
+    held = holder(values)
+    is_mixed = isinstance(held.known, Unknown) and any(
+        isinstance(function_choice([v]), OneOf) for v in values
+    )
+    return replace(held, known=RowOf(tuple(values))) if is_mixed else held
 
 
 def element(value: KnownValue) -> KnownValue:
@@ -248,7 +264,7 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
 def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
-    kinds = Local | Bound | Cached | OneOf | ListOf | Instance | Pure
+    kinds = Local | Bound | Cached | OneOf | ListOf | RowOf | Instance | Pure
     functions = all(isinstance(v.known, kinds) or callable(v.known) for v in values)
     if not values or not functions:
         return UNKNOWN_VALUE

@@ -9,7 +9,7 @@ from types import FunctionType
 from typing import Any
 
 from .captured import Captured, noted
-from .values import Given, KnownValue, Message, captured
+from .values import Given, Instance, KnownValue, Message, captured
 
 
 class Walk(ABC):
@@ -23,8 +23,10 @@ class Walk(ABC):
         self.read: dict[tuple[int, str], Captured] = {}
         self.numba_differs: list[str] = []  # see `FunctionReading`
         self.messages: list[Message] = []
+        self.keeps = 0  # how often a list or dict was given something that the call has not made
         self.classes: dict[ast.AST, type] = {}  # by where a function defines them
         self.tuples: set[type] = set()  # named tuples whose properties and operators are walked
+        self.objects: list[Instance] = []
         self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:
@@ -32,6 +34,11 @@ class Walk(ABC):
         if (id(holder), name) not in self.read:
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
+
+    def new_object(self, cls: type) -> Instance:
+        """Return an object that the call has made, of which nothing is known yet."""
+        self.objects.append(Instance(cls))
+        return self.objects[-1]
 
     def note(self, notes: Iterable[Captured]) -> None:
         """Keep notes of what a function or an object consists of."""

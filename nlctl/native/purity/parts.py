@@ -1,0 +1,62 @@
+"""Parts of what is taken apart: by names, by a place, by a key."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .values import (
+    OUTSIDE,
+    PLAIN,
+    UNKNOWN_VALUE,
+    KnownValue,
+    OneOf,
+    RowOf,
+    Unknown,
+    captured,
+    choice_among,
+    element,
+    forgotten,
+    least_upper_bound,
+)
+
+
+def part_at(value: KnownValue, i: int, count: int) -> KnownValue:
+    """Return what is known of one part of what is taken apart."""
+    known = value.known
+    if isinstance(known, RowOf):
+        return known.parts[i] if len(known.parts) == count else OUTSIDE
+    choices = known.choices if isinstance(known, OneOf) else (value,)
+    rows = [c.known for c in choices]
+    if all(isinstance(row, list | tuple) and len(row) == count for row in rows):
+        column = [row[i] for row in rows]
+        if all(isinstance(part, (*PLAIN, np.ndarray)) for part in column):
+            return replace(element(value), known=UNKNOWN_VALUE)
+        whole = least_upper_bound([captured(part) for part in column])
+        is_open = isinstance(whole.known, Unknown)
+        return replace(whole, known=choice_among(column)) if is_open else whole
+    return element(value)
+
+
+def part_of_row(base: KnownValue, key: Any) -> KnownValue:
+    """Return what is known of a part of a row."""
+    parts = base.known.parts
+    if isinstance(key, slice):
+        return forgotten(base)
+    is_known = type(key) is int and -len(parts) <= key < len(parts)
+    return parts[key] if is_known else least_upper_bound(parts)
+
+
+def part_of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
+    """Return what is known of an element of one of several lists, or of one of several dicts."""
+    known = [choice.known for choice in base.known.choices]
+    if all(isinstance(thing, dict) for thing in known):
+        key, inside = keys[0], KnownValue(base.inside, base.inside, True)
+        if len(keys) > 1 or not isinstance(key, PLAIN):
+            return inside
+        parts = [captured(thing[key]) for thing in known if key in thing]
+        return least_upper_bound(parts) if parts else inside
+    return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
