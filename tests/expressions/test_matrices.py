@@ -52,6 +52,15 @@ def test_matrices_are_those_of_numpy(name):
         assert compiled.dynamics(0.0, x) == pytest.approx(expected, rel=1e-14, nan_ok=True)
 
 
+def test_a_matrix_may_be_what_a_function_returns():
+    """As ``return A * X + B * u`` does; python-control takes its entries in order."""
+    system = ct.nlsys(lambda t, x, u, p: A * np.matrix(x).T + B * u[0], None, inputs=1, outputs=2,
+                      states=2, name="s")  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    assert compiled.dynamics(0.0, [1.0, 2.0], [3.0]) == pytest.approx([2.0, -5.0], rel=1e-14)
+
+
 @pytest.mark.parametrize(
     "function",
     [
