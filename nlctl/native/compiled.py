@@ -24,7 +24,7 @@ from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
 from . import floats, jacobians
-from .derivative_audit import audited_jacobian
+from .derivative_audit import audited_by_parameters, audited_jacobian
 from .describe import called, described
 from .diagram.checks import check_sizes
 from .diagram.parameters import length
@@ -293,7 +293,7 @@ class Compiled(Reading, StandIn):
                 raise unknown("parameter", name, places, f"of '{self.system.name}' that is a float")
             jacobians.check_enters_alone(places[name][1], name)
             directions[start + places[name][0], k] = 1.0
-        found = jacobians.jacobian(reading, x0, u0, t, params, directions)
+        found = audited_by_parameters(reading, parameters, directions, (t, x0, u0), params)
         return found["dx"], found["y"]
 
     def _call(

@@ -13,10 +13,9 @@ derivative, and differences are taken, which is said.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..diagrams import supplied_blocks
@@ -33,7 +32,7 @@ _BOTH_SIDES = np.concatenate([_STEPS, -_STEPS])
 _ALIKE, _APART = 1e-3, 1e-2  # parts by which differences agree, and by which they contradict
 _SEEN = 1e-9  # part of a value that differences show
 _WAYS, _NEIGHBOURS, _NEAR = 2, 16, 1e-6  # directions; points around; how far these are
-_Values = Callable[[np.ndarray], np.ndarray]  # of states and inputs, of shape (n + m,)
+_Values = Callable[[np.ndarray], np.ndarray]  # of a point's coordinates
 
 
 def audited_jacobian(
@@ -44,35 +43,69 @@ def audited_jacobian(
     n, m, given = system.nstates or 0, system.ninputs or 0, reading.schedule.ninputs
     directions = np.eye(n + given + length(reading.program.layout), n + m)
     point = np.append(state_array(system, x0), point_numbers("u0 needs", m, f"'{system.name}'", u0))
-    equations = reading.equations_with(reading.parameter_vector(params))
-
-    def derivatives(point: np.ndarray) -> dict[str, np.ndarray]:
-        return jacobian(reading, point[:n], point[n:], t, params, directions)
-
-    found = derivatives(point)
-    if not n + m or supplied_blocks(system) or inexact(equations, ("dx", "y")):
-        return found
     values = rates_and_outputs(system, params)
+    return _audited(
+        reading, params, point, [*system.state_labels, *system.input_labels],
+        lambda near: jacobian(reading, near[:n], near[n:], t, params, directions),
+        lambda near: values(t, near[:n], near[n:]),
+    )  # fmt: skip
 
-    def at(point: np.ndarray) -> np.ndarray:
+
+def audited_by_parameters(
+    reading: Reading, names: Sequence[str], directions: np.ndarray,
+    point: tuple[float, object, object], params: Mapping[str, Any] | None,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Return derivatives by parameters that differences do not contradict."""
+    system, (t, x0, u0) = reading.system, point
+    x = state_array(system, x0)
+    u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
+    start = directions.shape[0] - length(reading.program.layout)
+
+    def with_values(now: np.ndarray) -> dict[str, Any]:
+        return {**(params or {}), **dict(zip(names, now.tolist(), strict=True))}
+
+    return _audited(
+        reading, params, reading.parameter_vector(params) @ directions[start:], names,
+        lambda near: jacobian(reading, x, u, t, with_values(near), directions),
+        lambda near: rates_and_outputs(system, with_values(near))(t, x, u),
+    )  # fmt: skip
+
+
+def _audited(
+    reading: Reading, params: Mapping[str, Any] | None, point: np.ndarray, by: Sequence[str],
+    derivatives: Callable[[np.ndarray], dict[str, np.ndarray]],
+    values: Callable[[np.ndarray], tuple[np.ndarray, ...]],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Return derivatives at a point by what its coordinates are."""
+    system, found = reading.system, derivatives(point)
+    equations = reading.equations_with(reading.parameter_vector(params))
+    if not point.size or supplied_blocks(system) or inexact(equations, ("dx", "y")):
+        return found
+    count = (system.nstates or 0) + (system.noutputs or 0)
+
+    def at(near: np.ndarray) -> np.ndarray:
         try:
             with happening(), np.errstate(all="ignore"):
-                return np.concatenate(values(t, point[:n], point[n:]))
+                return np.concatenate(values(near))
         except Exception:  # past the end of what the blocks' functions are defined on
-            return np.full(n + (system.noutputs or 0), np.nan)
+            return np.full(count, np.nan)
 
-    matrix = _checked(system, _matrix(found), (at, lambda near: _matrix(derivatives(near))), point)
-    return found | dict(zip(("dx", "y"), np.split(matrix, [n]), strict=True))
+    of = [f"the rate of '{x}'" for x in system.state_labels]
+    of += [f"output '{y}'" for y in system.output_labels]
+    words = [[f"the derivative of {a} of '{system.name}' by '{b}'" for b in by] for a in of]
+    matrix = _checked(words, _matrix(found), (at, lambda near: _matrix(derivatives(near))), point)
+    return found | dict(zip(("dx", "y"), np.split(matrix, [system.nstates or 0]), strict=True))
 
 
 def _matrix(found: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the derivatives of rates and outputs, shape (n + noutputs, n + m)."""
+    """Return the derivatives of rates and outputs, shape (nstates + noutputs, coordinates)."""
     return np.concatenate([found["dx"], found["y"]])
 
 
 def _checked(
-    system: ct.InputOutputSystem, matrix: np.ndarray, of: tuple[_Values, _Values], point: np.ndarray
-) -> np.ndarray:
+    words: Sequence[Sequence[str]], matrix: np.ndarray, of: tuple[_Values, _Values],
+    point: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """Return the derivatives `matrix` of values; `of` has these and derivatives elsewhere."""
     at, slopes = of
     sizes, chance = np.where(point == 0.0, 1.0, np.abs(point)), np.random.default_rng(0)
@@ -85,31 +118,22 @@ def _checked(
     for column, way in enumerate(np.diag(sizes)):
         measured = _measured(at, point, way)
         for row in map(int, np.flatnonzero(_contradicted(matrix @ way, measured, seen))):
-            words = _in_words(system, row, column, matrix, measured[1] / sizes[column])
+            slope = measured[1, row] / sizes[column]
+            said = (
+                f"{words[row][column]} is {matrix[row, column] + 0.0:.6g} by its expressions and "
+            )
+            said += f"{slope:.6g} by differences of python-control's values"
             there = zip(near, around, strict=True)
             if all(_contradicted(m @ way, _measured(at, one, way), seen)[row] for m, one in there):
-                raise AuditError(f"{words}; nothing was returned: ct.linearize takes differences")
+                raise AuditError(f"{said}; nothing was returned: ct.linearize takes differences")
             warnings.warn(
-                f"{words}, which are taken: the expressions have the slope of one side of a kink, "
+                f"{said}, which are taken: the expressions have the slope of one side of a kink, "
                 "or of this point alone",
                 InexactWarning,
-                stacklevel=5,
+                stacklevel=6,
             )
-            matrix[row, column] = measured[1, row] / sizes[column]
+            matrix[row, column] = slope
     return matrix
-
-
-def _in_words(
-    system: ct.InputOutputSystem, row: int, column: int, matrix: np.ndarray, measured: np.ndarray
-) -> str:
-    of = [f"the rate of '{x}'" for x in system.state_labels]
-    of += [f"output '{y}'" for y in system.output_labels]
-    by = [*system.state_labels, *system.input_labels]
-    return (
-        f"the derivative of {of[row]} of '{system.name}' by '{by[column]}' is "
-        f"{matrix[row, column]:.6g} by its expressions and {measured[row]:.6g} by differences of "
-        "python-control's values"
-    )
 
 
 def _measured(at: _Values, point: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -116,12 +116,26 @@ def test_where_a_function_raises_an_error_there_are_no_differences():
 @pytest.mark.parametrize("part", [0.97, 1.03, 0.0, -1.0])
 def test_derivatives_that_are_wrong_everywhere_are_refused(part):
     """By the name of what changes, and of what it changes with."""
-    system = block(lambda x, u: [-x[0] + 2 * x[1], -3 * x[1]], states=2)
     exact = np.array([[-1.0, 2.0], [0.0, -3.0], [1.0, 0.0], [0.0, 1.0]])
     wrong = exact.copy()
     wrong[0, 1] *= part
+    words = [[f"{row} by {column}" for column in "ab"] for row in "rsyz"]
     for point in (np.array([1.0, -0.5]), np.zeros(2)):
-        right = _checked(system, exact, (lambda x: exact @ x, lambda x: exact), point)
+        right = _checked(words, exact, (lambda x: exact @ x, lambda x: exact), point)
         np.testing.assert_array_equal(right, exact)
-        with pytest.raises(errors.AuditError, match=r"the rate of 'x\[0\]' of 's' by 'x\[1\]'"):
-            _checked(system, wrong, (lambda x: exact @ x, lambda x: wrong), point)
+        with pytest.raises(errors.AuditError, match=r"r by b is .* by its expressions and 2 "):
+            _checked(words, wrong, (lambda x: exact @ x, lambda x: wrong), point)
+
+
+def test_parameters_at_a_value_with_an_expression_of_its_own():
+    """(exp(k x) - 1) / k is x at k = 0, where its derivative by k is x^2 / 2."""
+    system = ct.nlsys(
+        lambda t, x, u, p: [-np.expm1(p["k"] * x[0]) / p["k"] if p["k"] != 0 else -x[0]],
+        None, inputs=0, outputs=1, states=1, params={"k": 0.0}, name="s",
+    )  # fmt: skip
+    compiled = nlctl.compile(system)
+    with pytest.warns(errors.InexactWarning, match="by 's.k' is 0 by its expressions"):
+        rates, _ = compiled.parameter_jacobian(["s.k"], [2.0])
+    np.testing.assert_allclose(rates, -2.0, rtol=1e-4)
+    rates, _ = compiled.parameter_jacobian(["s.k"], [2.0], params={"s.k": 1.0})
+    np.testing.assert_allclose(rates, -(np.exp(2.0) + 1), rtol=1e-12)
