@@ -205,7 +205,7 @@ class ZenoError(DivergedError):
 
 
 class InexactWarning(UserWarning):
-    """Derivatives hold differences, of a function that is called in Python: it says which.
+    """Derivatives hold differences, such as of a function that is called in Python: it says which.
 
     Examples
     --------

@@ -455,11 +455,13 @@ def linearize(
         If an argument is refused, or the clocks have no common period.
     UnknownKeywordError, UsageError
         If there is no such keyword; if signals are delayed, whose past is not a state.
+    AuditError
+        If differences of python-control's own values contradict a derivative.
 
     Warns
     -----
     InexactWarning
-        If a function is called unchanged: its derivatives are differences, all others exact.
+        If derivatives are differences, as `Compiled.linearize` says; all others are exact.
 
     Examples
     --------
