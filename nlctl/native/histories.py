@@ -46,10 +46,10 @@ def lines_of(
 
 
 def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
-    """Return the workspace of a run that begins with what signals were before it."""
+    """Return the workspace of a run with what signals were before it, and when that jumps."""
     lines, lanes = task.lines.delays.shape
     if not lines:
-        return work
+        return work, np.zeros(0)
     begin = float(task.times[0])
     nodes, read = reading.schedule.nodes, reading.schedule.lines
     specs = [nodes[line.block or 0].system.current_spec for line in read]
@@ -80,7 +80,7 @@ def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
             later = breaks[breaks > max(first, 0)]
             work.past.first[row, j] = max(first, 0)
             work.past.next[row, j] = later[0] if later.size else -1
-    return work
+    return work, np.array([piece.start for piece in found if piece.breaks])
 
 
 def arriving_first(reading: Reading, task: Task) -> np.ndarray:

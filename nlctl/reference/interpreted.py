@@ -21,7 +21,6 @@ from ..responses.arguments import (
     interpolated,
     state_array,
 )
-from ..responses.breaks import jump_times
 from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, labels_of, response_of
 from ..sampling.system import happening
@@ -132,22 +131,14 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
         part.reshape(size or 0, reached.size)
         for part, size in zip(signals, (system.noutputs, system.nstates), strict=True)
     )
-    form = {"success": message is None, "message": message}
     response = response_of(
         system, (reached, y, x, interpolated(inputs, times, reached)), run.params, run.form,
-        labels_of(system), **form,
+        labels_of(system), success=message is None, message=message,
     )  # fmt: skip
     response.happened = event_log(driver.happened)
-    response.jump_times = _jump_times(driver, begin)
+    ticks = [t for t in driver.stops.due if t <= driver.reached]
+    response.jump_times = np.array([*ticks, *past.left])
     return response
-
-
-def _jump_times(driver: Driver, begin: float) -> np.ndarray:
-    """Return when held and delayed signals may jump (s), besides at events."""
-    happened = np.array([begin, *(event[0] for event in driver.happened)])
-    ticks = np.array([t for t in driver.stops.due if t <= driver.reached])
-    delays = np.array([spec.delay for spec in driver.known.specs])
-    return jump_times(happened, ticks, delays)
 
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:
