@@ -104,9 +104,10 @@ def run_once(
                     progress(float(run.lanes["t"][0]))  # not after each turn to another method
         except KeyboardInterrupt:
             run.lanes["status"] = Status.STOPPED
+        u = run.work.u.copy()  # where it has ended
         outputs = finish(run)
     reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
-    reached = at_its_end(run, reached)
+    reached = at_its_end(run, reached, u)
     if run.spare is not None:
         give_back(compiled.cache, run.spare)
     return reached

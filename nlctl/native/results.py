@@ -137,11 +137,11 @@ def _every_input(run: Any, j: int, done: int) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def at_its_end(run: Any, reached: Trajectory) -> Trajectory:
+def at_its_end(run: Any, reached: Trajectory, u: np.ndarray) -> Trajectory:
     """Return a single run with the instant at which a function has ended it as its last time."""
     if reached.statistics.status is not Status.ENDED or run.lanes["t"][0] <= reached.time[-1]:
         return reached
-    t, x, u = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x, run.work.u))
+    t, x = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x))
     y = np.empty((run.work.y.shape[1], x.shape[1]))
     run.machine.out(t, x, u, run.task.p, y)
     return replace(

@@ -69,7 +69,7 @@ class Switches:
         two = self._before[i]
         if small and self._are_small(value, t, two):
             if small.period < _AT_ONCE * np.ptp(self._ends):
-                raise self._chattering(t, self._over_and_over(i, 2))
+                raise self._chattering(t, self._over_and_over(i, 3))
             raise self._accumulate(small, t, _NOTHING)
         if len(times) % _LOOKED_AT == 0:
             self._check_pace(i, t, value)
@@ -90,7 +90,7 @@ class Switches:
         """Say that a condition is at one place, to its tolerances."""
         (block, which), times = self._label(i), self._times[i]
         whose = f"block '{block}' ({which})" if block else f"'{which}'"
-        took = times[-1] - times[-1 - count]
+        took = times[-1] - times[-count]
         return f"{whose} switches over and over again, {count} times in {took:.3g} s, {_NOTHING}"
 
     def _are_small(self, value: StateValue, now: float, two: deque[Switch]) -> bool:

@@ -50,6 +50,20 @@ def test_a_sign_behind_a_lag_ends_with_the_reason(system, block, start, engine):
 
 
 @engines
+def test_rates_that_lead_back_at_once_are_not_said_to_be_of_second_order(engine):
+    """x'' = -2 where x' > 1.2, and below -x, which is 0.2 there."""
+
+    def flow(t, x, u, params):
+        near = [-4.0 * x[0], 2.0 - x[0], -2.0]
+        return [x[1], np.select([x[0] > 1.0, x[0] < -0.5, x[1] > 1.2], near, -x[0])]
+
+    slides = own(flow, 2)
+    with pytest.raises(nlctl.errors.ChatteringError) as ended:
+        nlctl.input_output_response(slides, [0, 8.0], 0, [0.0, 1.5], engine=engine)
+    assert "second-order" not in str(ended.value)
+
+
+@engines
 def test_twisting_ends_near_the_time_of_its_last_switch(engine):
     """x'' = -3 sign(x) - sign(x'): half a turn takes 1.5 sqrt(|x|), and halves |x|."""
     twisting = own(lambda t, x, u, p: [x[1], -3 * np.sign(x[0]) - np.sign(x[1])], 2)

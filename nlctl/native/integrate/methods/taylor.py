@@ -263,7 +263,8 @@ def _aim(task, lanes, w):
         if lane.tries == 0:
             lane.at_once = 0.0
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
-            if _meets(task, w, i, w.ahead.g[i, j], j):
+            # of what begins at 0 rounding may be all that a step leaves of it: see `crossing`
+            if w.events.g_start[i, j] != 0.0 and _meets(task, w, i, w.ahead.g[i, j], j):
                 ends = w.events.g_start[i, j], w.ahead.g[i, j]
                 root = part_behind_root(
                     task.taylor.highest - 1, lane.step, w.taylor.terms, w.x.shape[0] + i, ends,
