@@ -310,10 +310,13 @@ def _meets(task, w, i, end, j):
 @numba.njit(**INNER)
 def _behind(task, lane, i, root):
     """Return the part of a step that ends right behind an event, by what can be told from none."""
+    # Longer each time: what a state adds in the shortest step may be lost in its rounding.
     part = root * (1.0 + _rest(task, i))
     if i < task.rows.declared:
         return part
-    return max(part, root + SMALLEST * abs(lane.t + root * lane.step) / lane.step)
+    part = max(part, root + SMALLEST * abs(lane.t + root * lane.step) / lane.step)
+    is_short = 0.0 < lane.last <= _LEFT * _shortest(task)
+    return max(part, _LONGER * lane.last / lane.step) if is_short else part
 
 
 @numba.njit(**INNER)
