@@ -248,8 +248,7 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     spare.work.lanes["stiff"] = method == "rodas5p"
-    work, early = with_past(compiled, task, spare.work, p)
-    return Run(machine=code, task=task, work=work, early=early, spare=spare)
+    return with_past(compiled, Run(machine=code, task=task, work=spare.work, spare=spare), p)
 
 
 def _bounds(settings: Settings) -> dict[str, Any]:

@@ -77,7 +77,6 @@ class Trajectory:
 def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
     """Return what became of one member."""
     lane, times, outputs = run.lanes[j], run.task.times, outputs[:, :, j]
-    lines = run.task.lines
     status, reached = Status(int(lane["status"])), float(lane["t"])
     done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
     if status is Status.OK and not np.all(np.isfinite(outputs)):
@@ -108,10 +107,7 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         statistics=statistics,
         inputs=_every_input(run, j, done),
         due=_due(run, j, reached),
-        leaving=[
-            partial(arrivals, delay=float(delay), varied=varied)
-            for delay, varied in zip(lines.delays[:, j], variations_in(lines), strict=True)
-        ],
+        leaving=_leaving(run.task.lines, j),
         culprit=int(lane["culprit"]),
         since=float(lane["since"]),
         guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
@@ -125,6 +121,12 @@ def _due(run: Any, j: int, reached: float) -> np.ndarray:
     ticks, kinks = run.task.clocks.ticks, run.task.lines.kinks
     due = np.concatenate([ticks[j] if ticks.size else ticks.ravel(), kinks.ravel(), run.early])
     return due[due <= reached]
+
+
+def _leaving(lines: Any, j: int) -> Sequence[Callable[[np.ndarray], np.ndarray]]:
+    """Return of each delay of lane `j` a function: when leaves what it is given at times."""
+    every = zip(lines.delays[:, j], variations_in(lines), strict=True)
+    return [partial(arrivals, delay=float(delay), varied=varied) for delay, varied in every]
 
 
 def _every_input(run: Any, j: int, done: int) -> np.ndarray:

@@ -119,9 +119,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
             raise
     except RuntimeError as error:
         # python-control takes a NaN signal for an algebraic loop: it never equals itself
-        t, x = driver.tried or (begin, x0)
-        is_loop = "loop" in str(error) or driver.reached == begin
-        if is_loop and not _overflows(system, t, x, at(t)):
+        if _is_loop(error, driver, begin, x0):
             raise
         failed = diverged(system, driver.reached)
         message = str(failed)
@@ -141,6 +139,13 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     ticks = [t for t in driver.stops.due if t <= driver.reached]
     response.jump_times = np.array([*ticks, *past.left])
     return response
+
+
+def _is_loop(error: RuntimeError, driver: Driver, begin: float, x0: np.ndarray) -> bool:
+    """Whether an algebraic loop ended a run, and not numbers that are not finite."""
+    t, x = driver.tried or (begin, x0)
+    is_loop = "loop" in str(error) or driver.reached == begin
+    return is_loop and not _overflows(driver.system, t, x, driver.inputs(t))
 
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:
