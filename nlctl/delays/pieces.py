@@ -16,7 +16,7 @@ _BETWEEN = np.array([-1.0, *0.5 * (_NODES[1:] + _NODES[:-1]), 1.0])
 _MISSED = 1e-13  # of a function's largest value
 _JUMPED = 1e-10  # of it: polynomials that go through one function meet more closely
 _BENT = 1e-8  # and so do their slopes, times the length of the shorter piece
-_HALVINGS = 40
+_HALVINGS, _SHARP = 40, 24  # smooth functions that were seen at 1000 places need fewer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ def smooth_pieces(
     places = begin + (end - begin) * (np.arange(PLACES) + 0.5) / PLACES
     looks = np.array([values(float(t)) for t in places]).T
     scale = np.abs(looks).max(axis=1)
-    left, before = [(begin, end, 0)], None
+    left, before, sharp = [(begin, end, 0)], None, np.inf
     while left:
         a, b, halvings = left.pop()
 
@@ -60,11 +60,13 @@ def smooth_pieces(
         fits = bool(np.all(missed <= _MISSED * scale[:, None]))
         if not fits and halvings < _HALVINGS:
             middle = 0.5 * (a + b)
+            sharp = middle if halvings > _SHARP else sharp
             left += [(middle, b, halvings + 1), (a, middle, halvings + 1)]
             continue
         piece = SmoothPiece(start=a, length=b - a, powers=powers, fits=fits)
         before = replace(
-            piece, breaks=not fits or (before is not None and _apart(before, piece, scale))
+            piece,
+            breaks=not fits or a == sharp or (before is not None and _apart(before, piece, scale)),
         )
         yield before
 

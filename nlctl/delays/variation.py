@@ -11,6 +11,7 @@ from numpy.polynomial import polynomial
 from ..errors import ParameterError
 from .pieces import PIECE_DEGREE, SmoothPiece, smooth_pieces
 
+_HALVINGS = 52  # of a run, to find a time in it
 _APART = 1e-9  # of the largest value: what jumps by more over 40 halvings is not continuous
 
 
@@ -23,6 +24,12 @@ class Variation:
     lengths: np.ndarray
     powers: np.ndarray  # (pieces, 6): coefficients (s) of powers of z, from -1 to 1 in each piece
     kinks: np.ndarray  # (kinks,): times (s) at which a derivative of V jumps
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Return V (s) at times of the run."""
+        k = np.maximum(np.searchsorted(self.starts, t, "right") - 1, 0)
+        z = np.clip(2.0 * (t - self.starts[k]) / self.lengths[k] - 1.0, -1.0, 1.0)
+        return polynomial.polyval(z, self.powers[k].T, tensor=False)
 
     def extreme(self, order: int, sign: int) -> tuple[float, float]:
         """Return where V, or its slope, is greatest or least, and how large it is there."""
@@ -90,6 +97,27 @@ def _check_continuous(whole: Variation, fits: np.ndarray, path: str) -> None:
             )
 
 
+def arrivals(sent: np.ndarray, delay: float, varied: Variation | None) -> np.ndarray:
+    """Return when leaves a delay what it is given at times (s); inf behind the run."""
+    if varied is None:
+        return sent + delay
+    begin, end = varied.starts[0], varied.starts[-1] + varied.lengths[-1]
+    low, high = np.full(sent.shape, begin), np.full(sent.shape, end)
+    for _ in range(_HALVINGS):  # the delay grows by less than 1 s per second
+        middle = 0.5 * (low + high)
+        later = middle - (delay + varied.at(middle)) < sent
+        low, high = np.where(later, middle, low), np.where(later, high, middle)
+    return np.where(high < end, high, np.inf)
+
+
+def history_breaks(spec: Any, earliest: float, begin: float) -> list[float]:
+    """Return when signals before a run jump or bend, of those that a `TransportDelay` sees (s)."""
+    if spec.history is None:
+        return []
+    pieces = smooth_pieces(spec.earlier, earliest, begin, len(spec.inputs))
+    return [piece.start for piece in pieces if piece.breaks]
+
+
 def check_positive(whole: Variation | None, delays: np.ndarray, path: str) -> None:
     """Refuse delays that a variation makes 0 or negative."""
     # Shapes: `delays` (lanes,).
@@ -99,6 +127,19 @@ def check_positive(whole: Variation | None, delays: np.ndarray, path: str) -> No
             f"TransportDelay needs delay + varying(t) > 0, got {delays.min() + least:g} s at "
             f"t = {t:g} s (block '{path}')"
         )
+
+
+def variations_in(lines: Any) -> list[Variation | None]:
+    """Return the variations that arrays of an integration hold, one for each line."""
+    return [
+        Variation(
+            starts=lines.vary_t[:n, i], lengths=lines.vary_h[:n, i], powers=lines.vary[:n, i],
+            kinks=lines.kinks[i][np.isfinite(lines.kinks[i])],
+        )
+        if n
+        else None
+        for i, n in enumerate(lines.varied.tolist())
+    ]  # fmt: skip
 
 
 def variation_table(variations: list[Variation | None]) -> dict[str, np.ndarray]:

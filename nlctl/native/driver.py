@@ -104,9 +104,10 @@ def run_once(
                     progress(float(run.lanes["t"][0]))  # not after each turn to another method
         except KeyboardInterrupt:
             run.lanes["status"] = Status.STOPPED
+        u = run.work.u.copy()  # where it has ended
         outputs = finish(run)
     reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
-    reached = at_its_end(run, reached)
+    reached = at_its_end(run, reached, u)
     if run.spare is not None:
         give_back(compiled.cache, run.spare)
     return reached
@@ -247,7 +248,7 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     spare.work.lanes["stiff"] = method == "rodas5p"
-    return Run(machine=code, task=task, work=with_past(compiled, task, spare.work, p), spare=spare)
+    return with_past(compiled, Run(machine=code, task=task, work=spare.work, spare=spare), p)
 
 
 def _bounds(settings: Settings) -> dict[str, Any]:

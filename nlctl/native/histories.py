@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,11 +46,12 @@ def lines_of(
     )  # fmt: skip
 
 
-def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
-    """Return the workspace of a run that begins with what signals were before it."""
+def with_past(reading: Reading, run: Any, p: np.ndarray) -> Any:
+    """Return a run with what its signals were before it."""
+    task = run.task
     lines, lanes = task.lines.delays.shape
     if not lines:
-        return work
+        return run
     begin = float(task.times[0])
     nodes, read = reading.schedule.nodes, reading.schedule.lines
     specs = [nodes[line.block or 0].system.current_spec for line in read]
@@ -62,7 +64,7 @@ def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
         return before(t, earliest)[told]
 
     found = list(smooth_pieces(histories, float(earliest.min()), begin, len(told)))
-    work = _with_places(work, max(_ROOM, 2 * len(found)))
+    work = _with_places(run.work, max(_ROOM, 2 * len(found)))
     work.past.level[: len(found)] = SMOOTH
     for row, line in enumerate(read):
         slot = reading.program.layout[line.block or 0]["before"]
@@ -80,7 +82,7 @@ def with_past(reading: Reading, task: Task, work: Work, p: np.ndarray) -> Any:
             later = breaks[breaks > max(first, 0)]
             work.past.first[row, j] = max(first, 0)
             work.past.next[row, j] = later[0] if later.size else -1
-    return work
+    return replace(run, work=work, early=np.array([one.start for one in found if one.breaks]))
 
 
 def arriving_first(reading: Reading, task: Task) -> np.ndarray:

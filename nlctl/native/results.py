@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..attributes import described_record
+from ..delays.variation import arrivals, variations_in
 from ..responses.breaks import jump_times
 from ..responses.event_log import NO_EVENTS, EventLog
 from .chattering.steps import Jump
@@ -49,8 +52,9 @@ class Trajectory:
     statistics: Statistics
     inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
     happened: EventLog = NO_EVENTS  # of a single run
-    ticks: np.ndarray = field(default_factory=lambda: np.zeros(0))  # when clocks tick (s)
-    delays: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of signals (s)
+    # when clocks tick, what is delayed has jumped before the run, and delays bend (s)
+    due: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    leaving: Sequence[Callable[[np.ndarray], np.ndarray]] = ()  # when leaves what comes at times
     culprit: int = -1  # the guard that has fallen last, or has ended it
     guard: float = 0.0  # and its value
     since: float = np.nan  # time of the first of the jumps that have ended it
@@ -61,8 +65,8 @@ class Trajectory:
     @property
     def jump_times(self) -> np.ndarray:
         """When held and delayed signals may jump (s), besides at events."""
-        happened = np.append(self.time[:1], self.happened.time)  # at first a history ends
-        return jump_times(happened, self.ticks, self.delays)
+        begin = self.time[:1]  # there a history ends
+        return jump_times(np.concatenate([self.due, begin, self.happened.time]), self.leaving)
 
     def cut_short(self, cut: frozenset[tuple[int, str]]) -> Trajectory:
         """Return it with the functions of which a loop may have ended it, if one may."""
@@ -102,8 +106,8 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         states=states,
         statistics=statistics,
         inputs=_every_input(run, j, done),
-        ticks=_ticks(run, j, reached),
-        delays=run.task.lines.delays[:, j].copy() if run.task.lines.delays.size else np.zeros(0),
+        due=_due(run, j, reached),
+        leaving=_leaving(run.task.lines, j),
         culprit=int(lane["culprit"]),
         since=float(lane["since"]),
         guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
@@ -112,10 +116,17 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
     ).cut_short(run.machine.lowered.cut)
 
 
-def _ticks(run: Any, j: int, reached: float) -> np.ndarray:
-    """Return when something was due to sampled blocks in lane `j`, until a time."""
-    ticks = run.task.clocks.ticks
-    return ticks[j][ticks[j] <= reached] if ticks.size else np.zeros(0)
+def _due(run: Any, j: int, reached: float) -> np.ndarray:
+    """Return when something was known to be due in lane `j`, until a time."""
+    ticks, kinks = run.task.clocks.ticks, run.task.lines.kinks
+    due = np.concatenate([ticks[j] if ticks.size else ticks.ravel(), kinks.ravel(), run.early])
+    return due[due <= reached]
+
+
+def _leaving(lines: Any, j: int) -> Sequence[Callable[[np.ndarray], np.ndarray]]:
+    """Return of each delay of lane `j` a function: when leaves what it is given at times."""
+    every = zip(lines.delays[:, j], variations_in(lines), strict=True)
+    return [partial(arrivals, delay=float(delay), varied=varied) for delay, varied in every]
 
 
 def _every_input(run: Any, j: int, done: int) -> np.ndarray:
@@ -128,11 +139,11 @@ def _every_input(run: Any, j: int, done: int) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def at_its_end(run: Any, reached: Trajectory) -> Trajectory:
+def at_its_end(run: Any, reached: Trajectory, u: np.ndarray) -> Trajectory:
     """Return a single run with the instant at which a function has ended it as its last time."""
     if reached.statistics.status is not Status.ENDED or run.lanes["t"][0] <= reached.time[-1]:
         return reached
-    t, x, u = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x, run.work.u))
+    t, x = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x))
     y = np.empty((run.work.y.shape[1], x.shape[1]))
     run.machine.out(t, x, u, run.task.p, y)
     return replace(

@@ -28,6 +28,7 @@ class Run:
     jumps: Mapping[int, Jump] = field(default_factory=dict)
     # with Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`
     series: Any = None
+    early: np.ndarray = field(default_factory=lambda: np.zeros(0))  # jumps before the run (s)
     spare: Spare | None = None  # memory that the next run may take when this one is over
 
     @property

@@ -70,7 +70,7 @@ class Driver:
         self.settings, self.progress = settings, progress
         # of each time of the response that was reached: time, outputs, states
         self.rows: list[tuple[float, np.ndarray, np.ndarray]] = []
-        self._held = np.zeros(0)
+        self._held, self.tried = np.zeros(0), None  # for which time and states rates were asked
         self.happened = jumps.happened  # time (s), block, which and direction of each event
 
     def run(self, begin: float, end: float, x: np.ndarray) -> None:
@@ -305,6 +305,7 @@ class Driver:
         x = np.array(y, dtype=float)
         x[self.jumps.still] = self._held[self.jumps.still]
         t = min(float(t), self._last)
+        self.tried = (t, x)
         dx = rates_now(self.system, t, x, self.inputs(t))
         dx[self.jumps.memories] = 0.0
         return dx

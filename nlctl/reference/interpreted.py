@@ -21,7 +21,6 @@ from ..responses.arguments import (
     interpolated,
     state_array,
 )
-from ..responses.breaks import jump_times
 from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, labels_of, response_of
 from ..sampling.system import happening
@@ -120,7 +119,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
             raise
     except RuntimeError as error:
         # python-control takes a NaN signal for an algebraic loop: it never equals itself
-        if not (driver.reached > begin or _overflows(system, begin, x0, at(begin))):
+        if _is_loop(error, driver, begin, x0):
             raise
         failed = diverged(system, driver.reached)
         message = str(failed)
@@ -132,22 +131,21 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
         part.reshape(size or 0, reached.size)
         for part, size in zip(signals, (system.noutputs, system.nstates), strict=True)
     )
-    form = {"success": message is None, "message": message}
     response = response_of(
         system, (reached, y, x, interpolated(inputs, times, reached)), run.params, run.form,
-        labels_of(system), **form,
+        labels_of(system), success=message is None, message=message,
     )  # fmt: skip
     response.happened = event_log(driver.happened)
-    response.jump_times = _jump_times(driver, begin)
+    ticks = [t for t in driver.stops.due if t <= driver.reached]
+    response.jump_times = np.array([*ticks, *past.left])
     return response
 
 
-def _jump_times(driver: Driver, begin: float) -> np.ndarray:
-    """Return when held and delayed signals may jump (s), besides at events."""
-    happened = np.array([begin, *(event[0] for event in driver.happened)])
-    ticks = np.array([t for t in driver.stops.due if t <= driver.reached])
-    delays = np.array([spec.delay for spec in driver.known.specs])
-    return jump_times(happened, ticks, delays)
+def _is_loop(error: RuntimeError, driver: Driver, begin: float, x0: np.ndarray) -> bool:
+    """Whether an algebraic loop ended a run, and not numbers that are not finite."""
+    t, x = driver.tried or (begin, x0)
+    is_loop = "loop" in str(error) or driver.reached == begin
+    return is_loop and not _overflows(driver.system, t, x, driver.inputs(t))
 
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:
@@ -183,7 +181,9 @@ def _by_python_control(run: RunArguments, inputs: Any, x0: Any, wanted: Any, how
 
 
 def _overflows(system: System, t: float, x: Any, u: np.ndarray) -> bool:
-    """Whether the right-hand side leaves the finite numbers at the start already."""
+    """Whether the right-hand side leaves the finite numbers."""
+    if not np.all(np.isfinite(x)):
+        return True
     try:
         with np.errstate(over="raise", invalid="raise"), happening():
             rates_now(system, t, np.asarray(x, dtype=float), u)

@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from ..blocks import Block
 from ..delays.pieces import PLACES
 from ..delays.transport import TransportDelay
-from ..delays.variation import check_positive, variation
+from ..delays.variation import check_positive, history_breaks, variation
 from ..supplied import SuppliedOutput
 from .stops import TIME_ROUNDING
 
@@ -49,13 +49,17 @@ class Past:
         # from where to where the run goes now, the side from which signals that jump are read
         self.step = (begin, begin)
         # of each block, increasing: when what jumps, or bends, leaves it
-        self._due: list[deque[float]] = [deque([self._arrival(spec, begin)]) for spec in self.specs]
+        self._due: list[deque[float]] = []
+        self.left: list[float] = []  # when such things have left a delay
         self._starts, self._ends, self._pieces = [], [], []
         self.lines: dict[Any, SuppliedOutput] = {}  # what leaves each block
         for number, made in enumerate(blocks):
             spec: Any = made.current_spec
             varied = variation(spec, begin, end, str(made.name))
             check_positive(varied, np.array([spec.delay]), str(made.name))
+            jumps = [*history_breaks(spec, _sent(spec, begin), begin), begin]
+            self._due.append(deque(self._arrival(spec, t) for t in jumps))
+            self.left += [] if varied is None else varied.kinks.tolist()
             self.lines[made] = SuppliedOutput(
                 leaving=lambda t, number=number: self._leaving(number, t),
                 arriving=np.full(made.noutputs or 0, np.nan),
@@ -83,7 +87,7 @@ class Past:
         next_stop = stop
         for spec, due in zip(self.specs, self._due, strict=True):
             while due and due[0] <= t + TIME_ROUNDING * abs(t):
-                due.popleft()
+                self.left.append(due.popleft())
             next_stop = min(next_stop, self._arrival(spec, t), due[0] if due else math.inf)
         return stop if stop - next_stop <= TIME_ROUNDING * abs(stop) else next_stop
 

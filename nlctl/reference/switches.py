@@ -22,6 +22,8 @@ from ..errors import ChatteringError
 _CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
 _MANY = 200  # switches of one condition, from which on their pace alone says what is to come
 _LOOKED_AT = 100  # switches, after each of which it is asked whether there are ever more
+_AT_ONCE = 1e-10  # of a run: two switches that are no further apart are at one place
+_NOTHING = "and what is compared is within tolerances of 0"
 _MORE = 1e4  # switches to come that are too many: each takes tens of milliseconds
 
 Switch = tuple[float, np.ndarray, np.ndarray]  # time (s), state and rates right behind it
@@ -66,7 +68,9 @@ class Switches:
         )
         two = self._before[i]
         if small and self._are_small(value, t, two):
-            raise self._accumulate(small, t, "and what is compared is within tolerances of 0")
+            if small.period < _AT_ONCE * np.ptp(self._ends):
+                raise self._chattering(t, self._over_and_over(i, 3))
+            raise self._accumulate(small, t, _NOTHING)
         if len(times) % _LOOKED_AT == 0:
             self._check_pace(i, t, value)
         two.append((t, x, rates))
@@ -76,14 +80,18 @@ class Switches:
         times, end = self._times[i], self._ends[1]
         took = t - times[-_LOOKED_AT]
         if (end - t) * _LOOKED_AT > _MORE * took and self._are_small(value, t, self._before[i]):
-            block, which = self._label(i)
-            whose = f"block '{block}' ({which})" if block else f"'{which}'"
-            words = f"{whose} switches over and over again, {_LOOKED_AT} times in {took:.3g} s"
-            raise self._chattering(t, f"{words}, and what is compared is within tolerances of 0")
+            raise self._chattering(t, self._over_and_over(i, _LOOKED_AT))
         if len(times) >= _MANY:
             more = crowd_of(np.array(times[-len(times) // 2 :]), i, end, np.inf, _MORE)
             if more:
                 raise self._accumulate(more, t, "too many for engine='python-control'")
+
+    def _over_and_over(self, i: int, count: int) -> str:
+        """Say that a condition is at one place, to its tolerances."""
+        (block, which), times = self._label(i), self._times[i]
+        whose = f"block '{block}' ({which})" if block else f"'{which}'"
+        took = times[-1] - times[-count]
+        return f"{whose} switches over and over again, {count} times in {took:.3g} s, {_NOTHING}"
 
     def _are_small(self, value: StateValue, now: float, two: deque[Switch]) -> bool:
         """Whether what is compared has stayed within tolerances since each of two switches."""

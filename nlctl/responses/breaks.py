@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +21,8 @@ _AT_ONCE = 1e-9  # of the time covered: breaks that are no further apart are one
 def breaks_of(response: SystemResponse) -> np.ndarray | None:
     """Return the times of the events of a response, in order and each once.
 
-    Ticks of clocks, at which held signals jump, and what comes out of constant delays are among
-    them where there are samples in between.
+    Ticks of clocks, at which held signals jump, and jumps that come out of delays are among them
+    where there are samples in between.
 
     Parameters
     ----------
@@ -63,13 +63,16 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
     return with_jumps(breaks, getattr(response, "jump_times", breaks[:0]), times)
 
 
-def jump_times(happened: np.ndarray, ticks: np.ndarray, delays: np.ndarray) -> np.ndarray:
-    """Return when clocks tick and when jumps come out of delays, also out of one behind another."""
-    if not delays.size:
-        return ticks
-    jumps = fresh = np.union1d(happened, ticks)
-    for _ in range(min(delays.size, _IN_SERIES)):
-        fresh = np.unique(fresh[:, None] + delays)
+def jump_times(
+    jumps: np.ndarray, leaving: Sequence[Callable[[np.ndarray], np.ndarray]]
+) -> np.ndarray:
+    """Return the times of jumps and when they come out of delays, also out of one behind another.
+
+    ``leaving(t)`` of a delay says when that comes out of it that jumps at times t.
+    """
+    fresh = jumps
+    for _ in range(min(len(leaving), _IN_SERIES)):
+        fresh = np.unique([of_delay(fresh) for of_delay in leaving])
         jumps = np.union1d(jumps, fresh)
     return jumps
 

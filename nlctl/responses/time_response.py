@@ -59,7 +59,7 @@ class Response(ct.TimeResponseData):
         What is in `events`.
     jump_times : ndarray of shape (n,)
         When held and delayed signals may jump (s), besides at events: where clocks tick, and where
-        what jumps comes out of constant delays.
+        what jumps comes out of delays.
     state_names : list of str
         Qualified names of the states, ``"plant.x1"``.
     wires : Wires

@@ -36,3 +36,15 @@ def test_rates_that_jump_by_more_than_a_step_can_be_short_for(rtol):
         clock, [0, 2], 0, [0.0, 0.0], engine="python-control", rtol=rtol, atol=1e-2 * rtol
     )
     assert run.states[1, -1] == pytest.approx(1e-4, abs=1e-7 + rtol)
+
+
+def test_an_algebraic_loop_that_a_saturation_closes_on_the_way_is_no_divergence():
+    """v = clip(2 cos t - v / 2, -1, 1): saturated up to cos t = 3/4, behind that no fixed order."""
+    swing = ct.nlsys(lambda t, x, u, p: [x[1], -x[0]], lambda t, x, u, p: [x[0]], inputs=0,
+                     outputs=["x"], states=2, name="swing")  # fmt: skip
+    clip = ct.nlsys(None, lambda t, x, u, p: [np.clip(2 * u[0] - u[1] / 2, -1, 1)],
+                    inputs=["x", "w"], outputs=["v"], name="clip")  # fmt: skip
+    loop = ct.interconnect([swing, clip], [["clip.x", "swing.x"], ["clip.w", "clip.v"]], [],
+                           ["clip.v"], name="loop")  # fmt: skip
+    with pytest.raises(RuntimeError, match="lgebraic loop"):
+        nlctl.input_output_response(loop, [0, 2], 0, [1, 0], engine="python-control")

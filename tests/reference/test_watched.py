@@ -62,6 +62,24 @@ def test_a_run_ends_where_its_condition_changes_its_sign(engine):
 
 
 @engines
+def test_the_end_of_a_run_has_its_own_inputs(engine):
+    """x' = u = t comes to 1 at t = sqrt(2), and behind a delay of 0.5 s so much later."""
+    x = ct.nlsys(lambda t, x, u, p: [u[0]], lambda t, x, u, p: [x[0], u[0]], inputs=["u"],
+                 outputs=["x", "v"], states=1, name="x")  # fmt: skip
+    late = nlctl.block(nlctl.TransportDelay(outputs=("v",), delay=0.5), "late")
+    behind = ct.interconnect([late, x], [["x.u", "late.v"]], ["late.u"], ["x.x", "x.v"],
+                             inputs=["u"], outputs=["x", "v"], name="behind")  # fmt: skip
+    for loop, delay in ((x, 0.0), (behind, 0.5)):
+        made = nlctl.input_output_response(
+            loop, [0, 1, 5], [0, 1, 5], engine=engine, rtol=1e-10, atol=1e-12,
+            stop_when=lambda t, x, u, p: x[0] - 1.0,
+        )  # fmt: skip
+        end = np.sqrt(2) + delay
+        np.testing.assert_allclose(made.outputs[:, -1], [1, np.sqrt(2)], atol=1e-8)
+        np.testing.assert_allclose([made.time[-1], made.inputs[0, -1]], end, atol=1e-8)
+
+
+@engines
 def test_a_terminal_function_ends_a_run_in_its_direction_only(engine):
     made = run(engine, events={"up": way(lambda t, x, u, p: x[0], 1, terminal=True)})
     assert made.time[-1] == pytest.approx(1.5 * np.pi, abs=1e-8)

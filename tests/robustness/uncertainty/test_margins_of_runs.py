@@ -13,21 +13,28 @@ END = 10.0
 T, FINE = np.linspace(0, END, 801), np.linspace(0, END, 100_001)
 OWN = ct.nlsys(None, lambda t, x, u, p: [np.clip(u[0], -1, 1)], inputs=["u"], outputs=["v"],
                name="own")  # fmt: skip
-LATE = ct.interconnect(
-    [
-        nlctl.block(nlctl.Relay(on=0.2, off=-0.2), "relay"),
-        nlctl.block(nlctl.TransportDelay(delay=0.457), "late", inputs="w", outputs="v"),
-    ],
-    connections=[["late.w", "relay.v"]], inplist=["relay.u"], outlist=["late.v"], inputs=["u"],
-    outputs=["v"], name="relay behind a delay",
-)  # fmt: skip
+
+
+def late(**how):
+    """A relay behind which its output is delayed."""
+    return ct.interconnect(
+        [
+            nlctl.block(nlctl.Relay(on=0.2, off=-0.2), "relay"),
+            nlctl.block(nlctl.TransportDelay(**how), "late", inputs="w", outputs="v"),
+        ],
+        connections=[["late.w", "relay.v"]], inplist=["relay.u"], outlist=["late.v"],
+        inputs=["u"], outputs=["v"], name="relay behind a delay",
+    )  # fmt: skip
+
+
 ACTUATORS = {
     "saturation": nlctl.Saturation(limit=1.0),
     "a function of one's own": OWN,
     "dead zone": nlctl.DeadZone(),
     "relay": nlctl.Relay(on=0.2, off=-0.2),
     "backlash": nlctl.Backlash(),
-    "a relay and a delay": LATE,
+    "a relay and a delay": late(delay=0.457),
+    "a relay and a delay that varies": late(delay=0.3, varying=lambda t: 0.1 * np.sin(t)),
     "a law at a clock": nlctl.sampled(
         ct.ss([], [], [], [[0.7]], 0.37, inputs="u", outputs="v", name="held")
     ),
