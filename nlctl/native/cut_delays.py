@@ -13,8 +13,9 @@ import numpy as np
 
 from ..errors import CompileError, UsageError
 from .compiled import Compiled
+from .derivative_audit import checked_derivatives
 from .diagram.parameters import length
-from .jacobians import differentiated_at, open_tangent, point_numbers
+from .jacobians import differentiated_at, inexact, open_tangent, point_numbers
 from .machine.evaluations import prepared_parameters
 
 _STEPS, _CLOSE = 50, 1e-12  # of Newton's method, for what leaves delays
@@ -105,6 +106,27 @@ class CutDiagram:
             return self.derivatives(x, u, w)
         outputs = found["y"]
         return Derivatives(found["dx"], outputs[: self.noutputs], outputs[self.noutputs :])
+
+    def checked(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> tuple[Derivatives, list[str]]:
+        """Return the derivatives at a point, and of which differences are taken, in words."""
+        point, ends = np.concatenate([x, u, w]), [self.n, self.n + self.m]
+        found = self.derivatives(x, u, w)
+        if not point.size or inexact(self.tangent.equations, ("dx", "y")):
+            return found, []
+        system, lines = self.compiled.system, range(self.lines)
+        of = [*system.state_labels, *system.output_labels, *(f"arrival {i}" for i in lines)]
+        by = [*system.state_labels, *system.input_labels, *(f"delayed {i}" for i in lines)]
+        matrix, said = checked_derivatives(
+            [[f"the derivative of '{a}' of '{system.name}' by '{b}'" for b in by] for a in of],
+            np.concatenate(found),
+            (
+                lambda z: np.concatenate(self.values(*np.split(z, ends))),
+                lambda z: np.concatenate(self.derivatives(*np.split(z, ends))),
+            ),
+            point,
+        )
+        rows = np.split(matrix, [self.n, self.n + self.noutputs])
+        return Derivatives(*rows), said
 
     def leaving(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return what leaves the delays where all signals have been constant."""

@@ -93,7 +93,9 @@ def _audited(
     of = [f"the rate of '{x}'" for x in system.state_labels]
     of += [f"output '{y}'" for y in system.output_labels]
     words = [[f"the derivative of {a} of '{system.name}' by '{b}'" for b in by] for a in of]
-    matrix = _checked(words, _matrix(found), (at, lambda near: _matrix(derivatives(near))), point)
+    both = at, lambda near: _matrix(derivatives(near))
+    matrix, said = checked_derivatives(words, _matrix(found), both, point)
+    tell_of(said, 6)
     return found | dict(zip(("dx", "y"), np.split(matrix, [system.nstates or 0]), strict=True))
 
 
@@ -102,38 +104,39 @@ def _matrix(found: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.concatenate([found["dx"], found["y"]])
 
 
-def _checked(
+def tell_of(said: Sequence[str], stacklevel: int) -> None:
+    """Warn of derivatives that are differences."""
+    for sentence in said:
+        warnings.warn(sentence, InexactWarning, stacklevel)
+
+
+def checked_derivatives(
     words: Sequence[Sequence[str]], matrix: np.ndarray, of: tuple[_Values, _Values],
     point: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Return the derivatives `matrix` of values; `of` has these and derivatives elsewhere."""
+) -> tuple[np.ndarray, list[str]]:  # fmt: skip
+    """Return the derivatives `matrix` of values, and of which differences are taken, in words."""
+    # `of` are functions of a point: the values, and the derivatives there
     at, slopes = of
     sizes, chance = np.where(point == 0.0, 1.0, np.abs(point)), np.random.default_rng(0)
     seen = _SEEN * np.fmax(np.abs(at(point)), np.abs(matrix) @ sizes)
     ways = sizes * chance.uniform(0.5, 1.0, (_WAYS, sizes.size))
     if not any(_contradicted(matrix @ way, _measured(at, point, way), seen).any() for way in ways):
-        return matrix
+        return matrix, []
     around = point + _NEAR * sizes * chance.uniform(-1.0, 1.0, (_NEIGHBOURS, sizes.size))
-    near, matrix = [slopes(one) for one in around], matrix.copy()
+    near, matrix, told = [slopes(one) for one in around], matrix.copy(), []
     for column, way in enumerate(np.diag(sizes)):
         measured = _measured(at, point, way)
         for row in map(int, np.flatnonzero(_contradicted(matrix @ way, measured, seen))):
             slope = measured[1, row] / sizes[column]
-            said = (
-                f"{words[row][column]} is {matrix[row, column] + 0.0:.6g} by its expressions and "
-            )
-            said += f"{slope:.6g} by differences of python-control's values"
+            said = f"{words[row][column]} is {matrix[row, column] + 0.0:.6g} by its expressions "
+            said += f"and {slope:.6g} by differences"
             there = zip(near, around, strict=True)
             if all(_contradicted(m @ way, _measured(at, one, way), seen)[row] for m, one in there):
                 raise AuditError(f"{said}; nothing was returned: ct.linearize takes differences")
-            warnings.warn(
-                f"{said}, which are taken: the expressions have the slope of one side of a kink, "
-                "or of this point alone",
-                InexactWarning,
-                stacklevel=6,
-            )
+            told.append(f"{said}, which are taken: the expressions have the slope of one side of a "
+                        "kink, or of this point alone")  # fmt: skip
             matrix[row, column] = slope
-    return matrix
+    return matrix, told
 
 
 def _measured(at: _Values, point: np.ndarray, way: np.ndarray) -> np.ndarray:

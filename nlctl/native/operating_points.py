@@ -324,8 +324,8 @@ def _equations(cut: CutDiagram, asked: _Asked) -> tuple[Callable[..., Any], Call
             [(rates - asked.dx)[asked.rates], (y - asked.y)[asked.outputs], arriving - w]
         )
 
-    def slope(z: np.ndarray) -> np.ndarray:
-        found = cut.derivatives(*parts(z))
+    def slope(z: np.ndarray, in_the_end: bool = False) -> np.ndarray:
+        found = cut.checked(*parts(z))[0] if in_the_end else cut.derivatives(*parts(z))
         rates, arriving = found.rates.copy(), found.arriving.copy()
         rates[:, :n] -= np.eye(n) if discrete else 0.0
         arriving[:, n + cut.m :] -= np.eye(cut.lines)
@@ -346,7 +346,7 @@ def _search(cut: CutDiagram, asked: _Asked, method: str | None, shown: bool) -> 
         result = _solved(residual, slope, z, method)
     z = _sharpened(residual, slope, np.asarray(result.x, dtype=float))
     x, u, w = residual.parts(z)  # type: ignore[attr-defined]
-    J = slope(z) if z.size else np.zeros((0, 0))
+    J = slope(z, in_the_end=True) if z.size else np.zeros((0, 0))
     known = np.isfinite(J).all()
     values = np.linalg.svd(J, compute_uv=False) if known and z.size else np.zeros(0)
     kind = {

@@ -8,7 +8,7 @@ import pytest
 
 import nlctl
 from nlctl import errors
-from nlctl.native.derivative_audit import _checked
+from nlctl.native.derivative_audit import checked_derivatives
 
 
 def block(rate, states=1, inputs=0):
@@ -121,10 +121,13 @@ def test_derivatives_that_are_wrong_everywhere_are_refused(part):
     wrong[0, 1] *= part
     words = [[f"{row} by {column}" for column in "ab"] for row in "rsyz"]
     for point in (np.array([1.0, -0.5]), np.zeros(2)):
-        right = _checked(words, exact, (lambda x: exact @ x, lambda x: exact), point)
+        right, said = checked_derivatives(
+            words, exact, (lambda x: exact @ x, lambda x: exact), point
+        )
         np.testing.assert_array_equal(right, exact)
+        assert not said
         with pytest.raises(errors.AuditError, match=r"r by b is .* by its expressions and 2 "):
-            _checked(words, wrong, (lambda x: exact @ x, lambda x: wrong), point)
+            checked_derivatives(words, wrong, (lambda x: exact @ x, lambda x: wrong), point)
 
 
 def test_parameters_at_a_value_with_an_expression_of_its_own():
@@ -139,3 +142,17 @@ def test_parameters_at_a_value_with_an_expression_of_its_own():
     np.testing.assert_allclose(rates, -2.0, rtol=1e-4)
     rates, _ = compiled.parameter_jacobian(["s.k"], [2.0], params={"s.k": 1.0})
     np.testing.assert_allclose(rates, -(np.exp(2.0) + 1), rtol=1e-12)
+
+
+def test_operating_points_and_frequency_responses_know_it():
+    """v' = u - v - z, z' = v at rest: isolated, and v / u = s / (s^2 + s + 1) is 1 at s = j."""
+    system = ct.nlsys(
+        lambda t, x, u, p: [u[0] + bristles(x, u)[0] - x[1], bristles(x, u)[1]],
+        lambda t, x, u, p: x[0], inputs=1, outputs=1, states=2, name="s",
+    )  # fmt: skip
+    point = nlctl.find_operating_point(system, [0.1, 0.1], [0.0])
+    np.testing.assert_allclose(point.states, 0.0, atol=1e-9)
+    assert point.isolated
+    with pytest.warns(errors.InexactWarning, match="by differences, which are taken"):
+        response = nlctl.frequency_response(system, [1.0], at=[0.0, 0.0])
+    np.testing.assert_allclose(response.frdata[0, 0, 0], 1.0, atol=1e-5)
