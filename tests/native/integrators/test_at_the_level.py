@@ -66,40 +66,6 @@ def test_a_level_that_steps_end_at_by_rounding_is_crossed(method, rtol):
     assert made.events["time"][0] == pytest.approx(np.arccos(1 - 1e-6), abs=1e-9)
 
 
-@nlctl.record
-class Room:
-    """A room that cools down to 16.5, and is at 17 at once."""
-
-    inputs, outputs, states, feedthrough = (), ("h",), ("h",), False
-    initial = {"h": 16.5}
-
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (10.0 - x[0],)
-
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-    @nlctl.equation
-    def guard(t, x, u, p):
-        return (x[0] - 16.5,)
-
-    @nlctl.equation
-    def reset(t, x, u, p):
-        return (17.0,)
-
-
-@how
-@pytest.mark.parametrize("begin", [0.0, 100.0])
-def test_a_guard_that_begins_at_0_falls_at_once(how, begin):
-    """What the shortest steps add to a state of 16.5 is lost in rounding."""
-    room = nlctl.block(Room(), "room")
-    made = nlctl.input_output_response(room, [begin, begin + 0.2], **how)
-    falls = begin + np.log(7 / 6.5) * np.arange(3)
-    np.testing.assert_allclose(made.events["time"], falls, rtol=0, atol=1e-5)
-
-
 @how
 def test_a_condition_of_time_at_the_end_of_a_run_is_seen_from_before(how):
     """It is 1 in each first half of a second, also from t = 10 s on."""

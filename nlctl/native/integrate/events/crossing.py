@@ -75,7 +75,7 @@ def _shortened(lane, beyond):
         if not is_stiff(lane):
             return NOTHING
         shorten(lane, 1.0)
-        lane.cross = lane.step * _WIDER ** min(lane.misses, _TRIES)
+        lane.cross = lane.step
         return REFUSED
     left = 1.0 - min(max(_CLEARLY * beyond, _GAP), _MOST)
     if is_stiff(lane):

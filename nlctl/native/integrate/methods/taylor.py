@@ -263,8 +263,7 @@ def _aim(task, lanes, w):
         if lane.tries == 0:
             lane.at_once = 0.0
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
-            # of what begins at 0 rounding may be all that a step leaves of it: see `crossing`
-            if w.events.g_start[i, j] != 0.0 and _meets(task, w, i, w.ahead.g[i, j], j):
+            if _meets(task, w, i, w.ahead.g[i, j], j):
                 ends = w.events.g_start[i, j], w.ahead.g[i, j]
                 root = part_behind_root(
                     task.taylor.highest - 1, lane.step, w.taylor.terms, w.x.shape[0] + i, ends,
@@ -310,13 +309,10 @@ def _meets(task, w, i, end, j):
 @numba.njit(**INNER)
 def _behind(task, lane, i, root):
     """Return the part of a step that ends right behind an event, by what can be told from none."""
-    # Longer each time: what a state adds in the shortest step may be lost in its rounding.
     part = root * (1.0 + _rest(task, i))
     if i < task.rows.declared:
         return part
-    part = max(part, root + SMALLEST * abs(lane.t + root * lane.step) / lane.step)
-    is_short = 0.0 < lane.last <= _LEFT * _shortest(task)
-    return max(part, _LONGER * lane.last / lane.step) if is_short else part
+    return max(part, root + SMALLEST * abs(lane.t + root * lane.step) / lane.step)
 
 
 @numba.njit(**INNER)
