@@ -303,7 +303,7 @@ def _native(run: arguments.RunArguments) -> Response:
     settings = solver_settings(**run.solver)
     compiled = run.system
     if is_system(compiled):
-        compiled = sized(compiled, run.inputs, run.initial_state)
+        compiled = sized(compiled, run.times, run.inputs, run.initial_state)
         compiled = compile_diagram(compiled, params=run.params)
     return respond(
         compiled,

@@ -137,7 +137,8 @@ def fit(
     if not isinstance(diagram, Compiled):
         first = measured[0]
         given = 0.0 if first.inputs is None else first.inputs
-        diagram = compile_diagram(sized(diagram, given, first.initial_state), params=params)
+        whole = sized(diagram, first.timepts, given, first.initial_state)
+        diagram = compile_diagram(whole, params=params)
     diagram = with_floats(diagram, checked_names("parameters", list(parameters)))
     observed = observations(measured, diagram.system)
     sought = _sought(diagram, parameters, separate, [one.name for one in observed])

@@ -137,5 +137,5 @@ def sensitivity_response(
         with_respect_to=with_respect_to, settings=settings, audit=audit,
     )  # fmt: skip
     if not isinstance(diagram, Compiled):
-        diagram = compile(sized(diagram, run.inputs, run.initial_state), params=params)
+        diagram = compile(sized(diagram, run.times, run.inputs, run.initial_state), params=params)
     return differentiated_run(diagram, run)

@@ -304,7 +304,7 @@ def _problem(
     (space, spec, cost, samples), (timepts, inputs, initial_state, params) = what, given
     tolerances("tune", how["rtol"], how["atol"])
     if not isinstance(diagram, Compiled):
-        diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
+        diagram = compile_diagram(sized(diagram, timepts, inputs, initial_state), params=params)
     diagram = with_floats(diagram, checked_names("space", [name for name, _ in _bounds(space)]))
     margins = _margins(spec, cost)
     params, states = dict(params or {}), state_array(diagram.system, initial_state)

@@ -286,11 +286,12 @@ def _items(finding: Finding, result: Result, asked: Tuning, key: str) -> Iterato
     )
     fresh = tables["fresh"]
     margins = fresh["before"].to_numpy(), fresh["after"].to_numpy()
+    of_both = figures.margins_of_both(*margins)  # which refuses a table without rows
     yield captioned(
         f"{key}-fresh",
         _FRESH + text.clipped(np.concatenate(margins)),
         f"Median before {np.median(margins[0]):.4g}, after {np.median(margins[1]):.4g}.",
-        figures.margins_of_both(*margins),
+        of_both,
     )
     ends = {c: column.map(margin_text) for c, column in tables["requirements"].items()}
     yield result_table(pd.DataFrame(ends), _SAMPLES, {"before": "before", "after": "after"})

@@ -7,6 +7,7 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...blocks import Block, supplied_of
 from ...delays.transport import PAST
@@ -101,22 +102,31 @@ def _check_counts(path: str, system: ct.NonlinearIOSystem) -> None:
 # -- blocks that do not say how many signals they have ---------------------------------------------
 
 
-def sized(system: System, inputs: object, initial_state: object) -> Any:
+def sized(system: System, times: ArrayLike, inputs: object, initial_state: object) -> Any:
     """Return a block with the numbers of states, inputs and outputs that a run gives it."""
     # python-control takes them from the run's arguments where a block does not declare them.
     counts = (system.nstates, system.ninputs, system.noutputs)
     diagram = isinstance(system, ct.InterconnectedSystem)
     if diagram or not isinstance(system, ct.NonlinearIOSystem) or None not in counts:
         return system
-    u, x = (as_numbers(value) for value in (inputs, initial_state))
-    if u is None or (x is None and initial_state is not None):
-        return system  # lists and names: what is missing is named when it is compiled
+    given, x = _input_rows(inputs, np.size(times)), as_numbers(initial_state)
+    if given is None or (x is None and initial_state is not None):
+        return system  # names: what is missing is named when it is compiled
     states = counts[0] if counts[0] is not None else 0 if x is None else x.size
-    rows = counts[1] if counts[1] is not None else u.shape[0] if u.ndim == 2 else 1
+    rows = counts[1] if counts[1] is not None else given
     outputs = counts[2]
     if outputs is None:
         outputs = states if system.outfcn is None else _output_size(system, states, rows)
     return _with(system, states, rows, outputs)
+
+
+def _input_rows(inputs: object, samples: int) -> int | None:
+    """Return how many inputs are given: a list has an entry for each, unless these are samples."""
+    if isinstance(inputs, list | tuple) and len(inputs) != samples:
+        rows = [_input_rows(np.asarray(entry), samples) for entry in inputs]
+        return None if None in rows else sum(row or 0 for row in rows)
+    u = as_numbers(inputs)
+    return None if u is None else u.shape[0] if u.ndim == 2 else 1
 
 
 def _with(system: Any, states: int, inputs: int, outputs: int | None) -> Any:
