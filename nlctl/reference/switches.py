@@ -18,6 +18,7 @@ from ..accumulation import (
     tolerance_of,
 )
 from ..errors import ChatteringError
+from ..wording import counted
 
 _CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
 _MANY = 200  # switches of one condition, from which on their pace alone says what is to come
@@ -90,8 +91,8 @@ class Switches:
         """Say that a condition is at one place, to its tolerances."""
         (block, which), times = self._label(i), self._times[i]
         whose = f"block '{block}' ({which})" if block else f"'{which}'"
-        took = times[-1] - times[-count]
-        return f"{whose} switches over and over again, {count} times in {took:.3g} s, {_NOTHING}"
+        took, often = times[-1] - times[-count], counted(count, "time")
+        return f"{whose} switches over and over again, {often} in {took:.3g} s, {_NOTHING}"
 
     def _are_small(self, value: StateValue, now: float, two: deque[Switch]) -> bool:
         """Whether what is compared has stayed within tolerances since each of two switches."""

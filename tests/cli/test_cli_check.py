@@ -98,7 +98,7 @@ def test_a_diverging_run_is_exit_code_1():
     assert lines["run"]["status"] == "violated"
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_the_worst_run_of_an_ensemble_can_be_run_again():
     """The printed command starts where the member started: its largest |r| is the same state."""
     options = ("--horizon", "3", "--ensemble", "2", "--seed", "3", "--set", "law.beta=3.5")

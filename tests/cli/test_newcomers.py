@@ -68,6 +68,7 @@ def pid():
 """
 
 
+@pytest.mark.weekly
 def test_a_researcher_puts_another_controller_into_the_paper(tmp_path):
     """Figure and page of a loop that lacks zeta, and what the proof lacks of it."""
     (tmp_path / "rival.py").write_text(RESEARCHER, encoding="utf-8")

@@ -24,7 +24,7 @@ settled = settling_time(times, 1 - np.ravel(y), 0.05).hex()
 """
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_a_run_has_the_same_numbers():
     """1 - y = exp(-t) is at 0.05 when t = ln 20; here modules are imported by other tests."""
     here: dict = {}

@@ -362,7 +362,7 @@ print(short_key(run), short_key(mean))
 '''
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_the_code_of_a_kind_has_one_key_in_every_process():
     """Also where its run mentions a name that the kind has: a schema is built from sets."""
     told = [

@@ -263,7 +263,7 @@ def assert_caught(what):
             book(loop(**make()))
         return
     found = book(loop(**make()))
-    assert not found.holds
+    assert found.holds is False
     assert key in {line.key for line in found.violated}
     assert found[key].follows
 

@@ -75,9 +75,18 @@ FORMULAS = {  # and what they are on fine samples
 }  # fmt: skip
 
 
+LONG = ("a relay and a delay", "a relay and a delay that varies", "backlash")  # in the reference
+CASES = [
+    pytest.param(
+        name, engine, marks=pytest.mark.weekly if engine != "native" and name in LONG else ()
+    )
+    for name in ACTUATORS
+    for engine in ("native", "python-control")
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["native", "python-control"])
-@pytest.mark.parametrize("name", ACTUATORS)
+@pytest.mark.parametrize(("name", "engine"), CASES)
 def test_margins_and_extremes_are_those_of_a_brute_force(name, engine):
     """To 1e-6, and what 1e5 samples miss themselves where a window ends on a slope."""
     signals, breaks = run(ACTUATORS[name], T, engine)
