@@ -25,7 +25,7 @@ _ASKING = (*COMPARISONS, *JUMPING)
 _OPEN = ("leaf", "call", "solve")  # what has a value of its own at each point
 _POINTS, _NUMBERS = 1024, 10**7  # so many, where all of their numbers have room
 _STEPS = 2.0 ** -np.array([3, 4, 5, 7])[:, None, None]  # parts of the sizes of arguments
-_ALIKE = 0.03  # part by which slopes that are alike may differ
+_ALIKE, _APART = 0.03, 0.09  # parts by which differences agree, and by which they contradict
 _ROUNDED = 1e-6  # part of a value in which no slope is seen
 _FEW = 8  # points at which so many numbers may be alike by chance
 _TOLERANCE = 1e-6  # constants below are no sizes of anything
@@ -59,15 +59,23 @@ def check_slopes(graph: Graph, results: Sequence[Expr], given: Iterable[Expr]) -
 
 
 def _have_another(slopes: np.ndarray, ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """Return at which points differences agree with each other and not with a slope."""
+    """Return at which points central differences contradict a slope."""
     with np.errstate(all="ignore"):
         values = np.nan_to_num(abs(ahead).max(axis=0), posinf=0.0)
         least = _ROUNDED * np.maximum(values, np.median(values, axis=1, keepdims=True))
         measured = (ahead - behind) / (2 * _STEPS)
-        size = np.maximum(abs(measured).max(axis=0), abs(slopes))
-        size = np.where(size > least, size, np.nan)
-        alike = np.ptp(measured, axis=0) < _ALIKE * size
-        return (alike & (abs(measured - slopes).min(axis=0) > 3 * _ALIKE * size)).any(axis=0)
+    return np.any(contradicted(slopes, measured, least, _ALIKE, _APART), axis=0)
+
+
+def contradicted(
+    slopes: np.ndarray, measured: np.ndarray, seen: np.ndarray, alike: float, apart: float
+) -> np.ndarray:
+    """Return where differences (steps, ...) agree with each other, and not with slopes (...)."""
+    # Up to the size `seen` differences see nothing.
+    with np.errstate(all="ignore"):
+        size = np.maximum(np.abs(measured).max(axis=0), np.abs(slopes))
+        differ = np.abs(measured - slopes).min(axis=0) > apart * size
+        return np.asarray(differ & (np.ptp(measured, axis=0) <= alike * size) & (size > seen))
 
 
 def _alone(nodes: Sequence[Expr], given: set[Expr]) -> tuple[Graph, dict[Expr, Expr]]:

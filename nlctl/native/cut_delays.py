@@ -13,8 +13,9 @@ import numpy as np
 
 from ..errors import CompileError, UsageError
 from .compiled import Compiled
-from .derivative_audit import checked_derivatives
+from .derivative_audit import checked_derivatives, derivatives_in_words
 from .diagram.parameters import length
+from .diagram.schedule import signal_name
 from .jacobians import differentiated_at, inexact, open_tangent, point_numbers
 from .machine.evaluations import prepared_parameters
 
@@ -113,11 +114,11 @@ class CutDiagram:
         found = self.derivatives(x, u, w)
         if not point.size or inexact(self.tangent.equations, ("dx", "y")):
             return found, []
-        system, lines = self.compiled.system, range(self.lines)
-        of = [*system.state_labels, *system.output_labels, *(f"arrival {i}" for i in lines)]
-        by = [*system.state_labels, *system.input_labels, *(f"delayed {i}" for i in lines)]
+        system, read = self.compiled.system, self.compiled.schedule
+        lines = [signal_name(read.nodes, line) for line in read.lines]
+        by = [*system.state_labels, *system.input_labels, *lines]
         matrix, said = checked_derivatives(
-            [[f"the derivative of '{a}' of '{system.name}' by '{b}'" for b in by] for a in of],
+            derivatives_in_words(system, by, lines),
             np.concatenate(found),
             (
                 lambda z: np.concatenate(self.values(*np.split(z, ends))),

@@ -21,8 +21,10 @@ import numpy as np
 from ..diagrams import supplied_blocks
 from ..diagrams.points import rates_and_outputs
 from ..errors import AuditError, InexactWarning
+from ..expressions.staircases import contradicted
 from ..responses.arguments import state_array
 from ..sampling.system import happening
+from ..upstream.systems import System
 from .diagram.parameters import length
 from .jacobians import inexact, jacobian, point_numbers
 from .reading import Reading
@@ -90,9 +92,7 @@ def _audited(
         except Exception:  # past the end of what the blocks' functions are defined on
             return np.full(count, np.nan)
 
-    of = [f"the rate of '{x}'" for x in system.state_labels]
-    of += [f"output '{y}'" for y in system.output_labels]
-    words = [[f"the derivative of {a} of '{system.name}' by '{b}'" for b in by] for a in of]
+    words = derivatives_in_words(system, by)
     both = at, lambda near: _matrix(derivatives(near))
     matrix, said = checked_derivatives(words, _matrix(found), both, point)
     tell_of(said, 6)
@@ -102,6 +102,16 @@ def _audited(
 def _matrix(found: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the derivatives of rates and outputs, shape (nstates + noutputs, coordinates)."""
     return np.concatenate([found["dx"], found["y"]])
+
+
+def derivatives_in_words(
+    system: System, by: Sequence[str], lines: Sequence[str] = ()
+) -> list[list[str]]:
+    """Return what is derived, rates, outputs and what arrives at delays, and by what."""
+    of = [f"the rate of '{x}'" for x in system.state_labels or ()]
+    of += [f"output '{y}'" for y in system.output_labels or ()]
+    of += [f"what enters '{line}'" for line in lines]
+    return [[f"the derivative of {a} of '{system.name}' by '{b}'" for b in by] for a in of]
 
 
 def tell_of(said: Sequence[str], stacklevel: int) -> None:
@@ -147,8 +157,5 @@ def _measured(at: _Values, point: np.ndarray, way: np.ndarray) -> np.ndarray:
 
 
 def _contradicted(slopes: np.ndarray, measured: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Return of which values differences agree with each other, and not with the slopes."""
-    with np.errstate(all="ignore"):
-        size = np.maximum(np.abs(measured).max(axis=0), np.abs(slopes))
-        apart = np.abs(measured - slopes).min(axis=0) > _APART * size
-        return apart & (np.ptp(measured, axis=0) <= _ALIKE * size) & (size > seen)
+    """Return of which values differences contradict the slopes along a way."""
+    return contradicted(slopes, measured, seen, _ALIKE, _APART)

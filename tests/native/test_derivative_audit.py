@@ -156,3 +156,24 @@ def test_operating_points_and_frequency_responses_know_it():
     with pytest.warns(errors.InexactWarning, match="by differences, which are taken"):
         response = nlctl.frequency_response(system, [1.0], at=[0.0, 0.0])
     np.testing.assert_allclose(response.frdata[0, 0, 0], 1.0, atol=1e-5)
+
+
+def test_what_leaves_a_delay_is_named():
+    """y = x + z with x' = w - x, z' = w at rest, and w = r - y(t - 1/2)."""
+    plant = ct.nlsys(
+        lambda t, x, u, p: [u[0] - x[0], u[0] * (1 - 2 * np.sign(u[0]) * x[1]) if u[0] else 0.0],
+        lambda t, x, u, p: x[0] + x[1], inputs=["w"], outputs=["y"], states=2, name="plant",
+    )  # fmt: skip
+    late = nlctl.block(nlctl.TransportDelay(delay=0.5), "late")
+    loop = ct.interconnect(
+        [plant, late], [["late.u", "plant.y"], ["plant.w", "-late.y"]], ["plant.w"], ["plant.y"],
+        inputs=["r"], outputs=["y"], name="loop",
+    )  # fmt: skip
+    with pytest.warns(errors.InexactWarning) as caught:
+        response = nlctl.frequency_response(loop, [1.0], at=[0.0, 0.0])
+    G = 1 / (1 + 1j) + 1 / 1j
+    np.testing.assert_allclose(response.frdata[0, 0, 0], G / (1 + G * np.exp(-0.5j)), atol=1e-5)
+    rate = "the derivative of the rate of 'plant_x[1]' of 'loop' by"
+    of_r, of_delayed = sorted(str(warning.message) for warning in caught)[::-1]
+    assert of_r.startswith(f"{rate} 'r' is 0")
+    assert of_delayed.startswith(f"{rate} 'late.y' is 0")
