@@ -219,7 +219,8 @@ def input_output_response(
         watched=watched_functions(stop_when, events),
         hold=hold,
     )
-    response = _computed(_held(arguments.unified(run)), "auto" if engine is None else engine)
+    run = _held(_sized(arguments.unified(run)))
+    response = _computed(run, "auto" if engine is None else engine)
     if run.watched and response.success is not False:
         check_moves(run.watched, (response.t, response.x, response.u), params)
     return response
@@ -228,8 +229,13 @@ def input_output_response(
 def _held(run: arguments.RunArguments) -> arguments.RunArguments:
     """Return a run with the inputs of a zero-order hold as steps, in continuous time."""
     system = run.system.system if isinstance(run.system, StandIn) else run.system
-    if run.hold == "foh" or not (is_system(system) and ct.isctime(system) and system.ninputs):
+    if run.hold == "foh" or not (is_system(system) and ct.isctime(system)) or system.ninputs == 0:
         return run
+    if system.ninputs is None:
+        raise ParameterError(
+            f"hold='zoh' needs the number of inputs of block '{system.name}': give inputs=... "
+            "to ct.nlsys"
+        )
     times, inputs = arguments.held(run.times, arguments.input_array(system, run.inputs, run.times))
     evaluation = run.evaluation_times
     evaluation = run.times if isinstance(evaluation, str) and evaluation == "T" else evaluation
@@ -260,6 +266,19 @@ def _computed(run: arguments.RunArguments, engine: str) -> Response:
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=4)
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
+
+
+def _sized(run: arguments.RunArguments) -> arguments.RunArguments:
+    """Return a run of a block that has the numbers of signals which the run gives it."""
+    if not is_system(run.system):
+        return run
+    from .native.diagram.checks import sized  # late: needs numba
+
+    try:
+        system = sized(run.system, run.times, run.inputs, run.initial_state)
+    except CompileError:  # its function remembers: no call of it is for nothing
+        return run
+    return replace(run, system=system)
 
 
 def _known(system: System, params: Any, times: np.ndarray, watched: tuple[Watched, ...]) -> Known:

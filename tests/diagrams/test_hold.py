@@ -47,6 +47,39 @@ def test_one_sample_is_a_pulse_of_one_interval(height, at):
     np.testing.assert_allclose(between.outputs, height * T[1] * np.array([0, 0, 0.5, 1]), atol=1e-9)
 
 
+@pytest.mark.parametrize("engine", ["auto", "native", "python-control"])
+def test_a_block_without_sizes_is_held_and_named_as_one_that_has_them(engine):
+    """x' = u - x, y = x: a run says how many signals there are, in both engines."""
+    u = np.cos(3 * T)
+    vague, sized = (
+        ct.nlsys(lambda t, x, u, params: u - x, None, name="lag", **sizes)
+        for sizes in ({}, {"states": 1, "inputs": 1, "outputs": 1})
+    )
+    for hold in ("zoh", "foh"):
+        run, reference = (
+            nlctl.input_output_response(lag, T, u, 0.0, hold=hold, engine=engine)
+            for lag in (vague, sized)
+        )
+        np.testing.assert_array_equal(run.outputs, reference.outputs)
+        assert run.to_pandas().equals(reference.to_pandas())
+
+
+def test_what_remembers_is_not_called_to_be_sized():
+    """Then no one knows how many inputs are held; without a hold python-control runs it."""
+    calls: list[float] = []
+
+    def output(t, x, u, params):
+        calls.append(t)
+        return 2 * u
+
+    vague = ct.nlsys(None, output, name="vague")
+    with pytest.raises(nlctl.errors.ParameterError, match="number of inputs of block 'vague'"):
+        nlctl.input_output_response(vague, T, T, hold="zoh")
+    assert not calls
+    run = nlctl.input_output_response(vague, T, T[None, :], engine="python-control")
+    np.testing.assert_array_equal(np.ravel(run.outputs), 2 * T)
+
+
 def test_a_memory_sees_the_steps():
     """A play of half gap 0.5 moves by what a step goes beyond it, and holds."""
     play = nlctl.block(nlctl.Backlash(c_r=0.5, c_l=-0.5, m_r=1.0, m_l=1.0), "play")
