@@ -98,7 +98,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[str] = ()) -> str:
     """Return the one key of `known` that `name` means: the full path, or the end of one path."""
-    matches = [name] if name in known else [k for k in known if k.endswith("." + name)]
+    matches = [name] if name in known else [k for k in known if k.endswith(f".{name}")]
     if not matches:
         raise unknown(kind, name, known)
     if len(matches) > 1:

@@ -321,11 +321,6 @@ def check_params(spec: Any) -> None:
 def _normalised(who: str, name: str, value: object, rule: Param, kind: object) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
     ndim = rule.ndim
-    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray):
-        if not len(value):
-            return ()
-        if np.shape(value)[1:] == (0,) and ndim == 2:  # rows without a column
-            return ((),) * len(value)
     if kind in (bool, "bool"):
         if not isinstance(value, bool | np.bool_):
             raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
@@ -338,7 +333,7 @@ def _normalised(who: str, name: str, value: object, rule: Param, kind: object) -
     if array.ndim != ndim:
         shape = {0: "a number", 1: "a vector", 2: "a matrix"}[ndim]
         raise ParameterError(f"{who} needs {name} to be {shape}, got shape {array.shape}")
-    if array.size == 0:
+    if array.size == 0 and not (rule.may_be_empty and (ndim == 1 or len(array))):
         raise ParameterError(f"{who} needs at least one value in {name}, got none")
     if kind in (int, "int"):
         if not (math.isfinite(array) and float(array).is_integer()):

@@ -33,9 +33,9 @@ def nearest(name: str, known: Iterable[str], most: int, cutoff: float) -> list[s
     plain: dict[str, list[str]] = {}
     for option in known:
         plain.setdefault(option.lower(), []).append(option)
-    near = difflib.get_close_matches(name.lower(), plain, n=most, cutoff=cutoff)
+    near = difflib.get_close_matches(str(name).lower(), plain, n=most, cutoff=cutoff)
 
     def apart(option: str) -> float:
-        return -difflib.SequenceMatcher(a=option, b=name).ratio()
+        return -difflib.SequenceMatcher(a=option, b=str(name)).ratio()
 
     return [option for text in near for option in sorted(plain[text], key=apart)][:most]

@@ -166,6 +166,7 @@ def ensemble_response(
     params = checked_params(params) or {}
     compiled = as_given(compiled, params)
     every = members(compiled, params, given["initial_state"])
+    metrics = tuple(metrics)
     _check_signals(compiled, keep, metrics)
     if max_step is not None:
         checked_number("ensemble_response", "max_step", max_step, above=0)

@@ -165,6 +165,7 @@ def judged(system, t, x, u):
         return 0
     found = values(made.equations, made.where, scalars(system, t, x, u))
     dots = [changing(symbol(label), DERIVATIVE) for label in system.state_labels]
+    dx = np.broadcast_to(dx.astype(float), len(dots))  # None is NaN in all states of a run
     wanted = dict(zip(dots, dx, strict=True))
     wanted |= {symbol(n): v for n, v in zip(system.output_labels, y, strict=True)}
     for name, value in found.items():

@@ -45,7 +45,7 @@ def limited(limit):
         raise TooLong
 
     before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, limit)
+    signal.setitimer(signal.ITIMER_REAL, limit, 1.0)  # again: a callback of ctypes swallows it
     try:
         yield
     finally:
@@ -102,6 +102,7 @@ BOUNDS = {  # raw errors and calls that do not end, of calls; 16 of 100 of all o
 
 
 @pytest.mark.weekly
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("group", GROUPS)
 def test_calls_with_one_wrong_argument_end_in_a_sentence(group, tmp_path, monkeypatch):
     """Fifty wrong values of every argument; what is callable may raise what it likes."""
