@@ -306,7 +306,7 @@ class Driver:
         x[self.jumps.still] = self._held[self.jumps.still]
         t = min(float(t), self._last)
         self.tried = (t, x)
-        dx = rates_now(self.system, t, x, self.inputs(t))
+        dx = np.broadcast_to(rates_now(self.system, t, x, self.inputs(t)), x.shape).astype(float)
         dx[self.jumps.memories] = 0.0
         return dx
 

@@ -8,6 +8,7 @@ argument that the function takes apart.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -36,6 +37,8 @@ from ..purity.dicts import (
 )
 from ..purity.objects import frozen
 from .remedies import remedy_of
+
+NO_NUMBERS = (str, bytes, complex, type(None))  # though NumPy would make floats of some
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +116,9 @@ class Call:
     def _numbers(self, values: object) -> np.ndarray:
         """Return what a function returns as a vector; what is not a number is refused."""
         array = np.asarray(values).reshape(-1)
+        if array.dtype.kind == "O" and not any(isinstance(v, NO_NUMBERS) for v in array):
+            with suppress(TypeError, ValueError):  # python-control converts them as well
+                return array.astype(float)
         if array.dtype.kind not in "biufc":
             raise BlockError(
                 f"block '{self.block}' returns {str(values)[:60]!r} from its {self.kind} function, "

@@ -1,5 +1,8 @@
 """What functions return: lists, tuples, columns, scalars, of the right size and of wrong ones."""
 
+from decimal import Decimal
+from fractions import Fraction
+
 import numpy as np
 
 from ._entry import entry, pieces
@@ -178,5 +181,25 @@ def nothing_on_one_path(n):
     def update(t, x, u, params):
         if u[0] <= 0.5:
             return -x
+
+    return pieces(update, states=n)
+
+
+@entry
+def array_of_objects(n):
+    """Numbers of several types, of which a run makes floats."""
+
+    def update(t, x, u, params):
+        rates = [-x[k] if k % 2 else Fraction(1, 3) * 2 for k in range(n)]
+        rates[-1] = Decimal("0.25") if u[0] > 0 else np.array(np.bool_(True))
+        return np.array(rates, dtype=object)
+
+    return pieces(update, states=n)
+
+
+@entry
+def array_of_objects_and_a_difference(n):
+    def update(t, x, u, params):
+        return np.array([*x[1:], 3 * np.cos(x[0]) ** 2 - x[-1]], dtype=object)
 
     return pieces(update, states=n)
