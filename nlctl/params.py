@@ -194,7 +194,8 @@ def record(cls: type[_T]) -> type[_T]:
             if name not in known:
                 raise unknown("parameter", name, known, f"of {cls.__name__}", UnknownKeywordError)
         if arguments:
-            example = f"{cls.__name__}({known[0]}=...)" if known else f"{cls.__name__}()"
+            first = next(iter([*_declared(described), *known]), None)
+            example = f"{cls.__name__}({first}=...)" if first else f"{cls.__name__}()"
             raise UnknownKeywordError(
                 f"{cls.__name__} takes no positional argument, got {repr(arguments[0])[:40]}: "
                 f"parameters go by name, {example}"
