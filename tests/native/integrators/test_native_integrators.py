@@ -196,9 +196,9 @@ def test_made_anew_it_is_the_same_file(tmp_path):
 @pytest.mark.weekly
 def test_edited_sources_are_compiled_and_kept(tmp_path, monkeypatch):
     """Without what is shipped: numba once, then from the cache, and the same bits."""
+    expected = [array.tobytes() for array in results()]
     monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(integrators, "SHIPPED", tmp_path / "none")
-    expected = [array.tobytes() for array in results()]
     for compiles in (True, False):
         with event.install_recorder("numba:compile") as recorded:
             code = integrators._integrators.__wrapped__()
