@@ -22,8 +22,7 @@ import numpy as np
 import scipy
 
 from nlctl import wording
-from nlctl.expressions.source import codes_in
-from nlctl.native.purity.captured import in_cell
+from nlctl.reached import around, names_read
 
 _BUILTINS = ("isinstance", "issubclass", "type", "hasattr", "getattr", "setattr", "delattr",
              "vars", "dir", "callable", "repr", "str", "format", "ascii", "bytes", "memoryview",
@@ -100,7 +99,7 @@ def _reached(member: object) -> Iterator[Any]:
     elif isinstance(member, types.MethodType):
         yield member.__func__
         code = getattr(member.__func__, "__code__", None)
-        yield from _of_object(member.__self__, _names(code) if code else set())
+        yield from _of_object(member.__self__, set(names_read(code)) if code else set())
     elif isinstance(member, property):
         yield member.fget
     elif isinstance(member, functools.partial):
@@ -119,15 +118,13 @@ def _reached(member: object) -> Iterator[Any]:
 def _of_function(function: types.FunctionType) -> Iterator[Any]:
     """Yield its code, what it closes over and, of a user's, what it names."""
     yield getattr(function, "__wrapped__", None)
-    held = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
-    held += [in_cell(cell) for cell in function.__closure__ or ()]
+    given = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
     if is_of_library(function):
-        yield from held
+        yield from (*given, *around(function, ()))
         return
     yield function.__code__
-    names = _names(function.__code__)
-    held += [function.__globals__[name] for name in names & set(function.__globals__)]
-    for thing in held:
+    names = set(names_read(function.__code__))
+    for thing in (*given, *around(function)):
         yield thing
         yield from _of_object(thing, names)
 
@@ -154,11 +151,7 @@ def _of_object(owner: object, names: set[str]) -> Iterator[Any]:
             yield from _of_object(fields[name], names - {name})
         function = getattr(members[name], "fget", getattr(members[name], "__func__", members[name]))
         if isinstance(function, types.FunctionType):  # what it calls of its own object
-            waiting |= (_names(function.__code__) & set(members)) - done
-
-
-def _names(code: types.CodeType) -> set[str]:
-    return {name for part in codes_in(code) for name in part.co_names}
+            waiting |= (set(names_read(function.__code__)) & set(members)) - done
 
 
 def _question_in(code: types.CodeType) -> str | None:

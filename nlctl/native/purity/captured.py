@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ...reached import in_cell
 from .values import PLAIN
 
 
@@ -59,14 +60,6 @@ class Captured:
             owner = owner.func
         name = getattr(owner, "__qualname__", "")
         return f"{name}.{self.name}" if name else self.name
-
-
-def in_cell(cell: CellType, empty: object = None) -> Any:
-    """Return what is in the cell of a closure, something else if it is not filled."""
-    try:
-        return cell.cell_contents
-    except ValueError:
-        return empty
 
 
 def noted(holder: object, name: str, value: object) -> Captured:
