@@ -12,7 +12,6 @@ import numpy as np
 
 from .errors import ParameterError
 from .params import as_numbers
-from .params import flag as flag
 from .params import integer as integer
 from .wording import nearest
 
@@ -103,6 +102,13 @@ def vector(who: str, name: str, value: object) -> np.ndarray:
 def fraction(who: str, name: str, value: object) -> float:
     """Return a number between 0 and 1, both excluded."""
     return number(who, name, value, above=0, below=1)
+
+
+def flag(who: str, name: str, value: object) -> bool:
+    """Return True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
+    return bool(value)
 
 
 def of_type(who: str, name: str, value: object, kind: type[_T], how: str = "") -> _T:

@@ -45,7 +45,7 @@ def described_record(cls: Any = None, /, *, made_by: str = "", **options: bool) 
         return functools.partial(described_record, made_by=made_by, **options)
     cls = dataclasses.dataclass(frozen=True, kw_only=True, **options)(cls)
     example = f"\n\nExamples\n--------\nSee `{made_by}`." if made_by else ""
-    cls.__doc__ = LazyDocstring(inspect.cleandoc(cls.__doc__ or "") + example, _with_attributes)
+    cls.__doc__ = _Docstring(inspect.cleandoc(cls.__doc__ or "") + example)
     return cls
 
 
@@ -53,8 +53,7 @@ def with_returned(function: Any) -> str | None:
     """Return the docstring of a function, with the section Returns for a described record."""
     name, text = function.__annotations__.get("return"), inspect.cleandoc(function.__doc__ or "")
     docstring = vars(function.__globals__.get(name, object)).get("__doc__")
-    is_described = getattr(docstring, "complete", None) is _with_attributes
-    if not text or not is_described or "Returns\n---" in text:
+    if not text or not isinstance(docstring, _Docstring) or "Returns\n---" in text:
         return function.__doc__
     summary = docstring.text.partition("\n\n")[0]
     section = f"Returns\n-------\n{name}\n    {summary}"
@@ -88,21 +87,18 @@ def _parameters(text: str) -> dict[str, str]:
     return {name.strip(" *"): e for e in entries for name in e.partition(" : ")[0].split(",")}
 
 
-class LazyDocstring:
-    """The docstring of a class, completed by ``complete(cls, text)`` when somebody reads it."""
+class _Docstring:
+    """A docstring that is completed when somebody reads it."""
 
-    def __init__(self, text: str, complete: Callable[[type, str], str]) -> None:
-        self.text, self.complete, self.whole = text, complete, ""
+    def __init__(self, text: str) -> None:
+        self.text, self.whole = text, ""
 
     def __get__(self, instance: object, owner: type) -> str:
-        self.whole = self.whole or self.complete(owner, self.text)
+        if not self.whole:
+            entries = _entries(owner)
+            section = f"Attributes\n----------\n{entries}" if entries else ""
+            self.whole = _with_section(self.text, section)
         return self.whole
-
-
-def _with_attributes(cls: type, text: str) -> str:
-    """Return a docstring with an entry for each of a class's own fields."""
-    entries = "\n".join(_entry(*row) for row in _rows(cls))
-    return _with_section(text, f"Attributes\n----------\n{entries}" if entries else "")
 
 
 def _with_section(text: str, section: str, *, after_parameters: bool = False) -> str:
@@ -121,6 +117,11 @@ def entries_by_field(cls: type) -> dict[str, list[str]]:
     """
     rows = [(names.split(", ")[0], names, kind, text) for names, kind, text in _rows(cls)]
     return {first: _entry(*row).splitlines() for first, *row in rows if row[2]}
+
+
+def _entries(cls: type) -> str:
+    """Return the entries of a class's own fields."""
+    return "\n".join(_entry(*row) for row in _rows(cls))
 
 
 def _entry(names: str, kind: str, text: str) -> str:

@@ -297,8 +297,7 @@ class Parameters(dict[str, Any]):
             return ""
         table = self if self.table is None else self.table
         prefix = self.prefix if self.table is None else ""
-        owners = {k: table.owners.get(k.removeprefix(prefix)) for k in twins}
-        theirs = [k for k, block in owners.items() if getattr(type(block), "reads_a_dict", False)]
+        theirs = [k for k in twins if _reads_a_dict(table.owners.get(k.removeprefix(prefix)))]
         if len(theirs) > 1:
             raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(sorted(theirs))}")
         if theirs:
@@ -308,6 +307,11 @@ class Parameters(dict[str, Any]):
             f"{' or '.join(repr(t) for t in twins)} (a block of your own that reads "
             f"'{name}' declares it in its params)"
         )
+
+
+def _reads_a_dict(block: Any) -> bool:
+    """Whether a block is a third-party one, whose parameters may go without its name."""
+    return bool(getattr(type(block), "reads_a_dict", False))
 
 
 def _same_block(name: str, names: Iterable[str]) -> bool:

@@ -18,7 +18,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from .annotations import as_numbers, reporting
-from .attributes import LazyDocstring, entries_by_field
+from .attributes import entries_by_field
 from .errors import ParameterError, UnknownKeywordError
 from .names import base_name, element_index, unknown
 from .pickles import state_of, with_state
@@ -185,7 +185,7 @@ def record(cls: type[_T]) -> type[_T]:
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     described: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     _complete(described)
-    described.__doc__ = LazyDocstring(doc or "", _documented)
+    described.__doc__ = _DocstringOfRecord(doc or "")
     init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
     @functools.wraps(init)
@@ -219,6 +219,17 @@ def _complete(cls: type) -> None:
         cls.feedthrough = getattr(cls, "feedthrough", True)
         if not hasattr(cls, "update"):
             cls.states = getattr(cls, "states", ())
+
+
+class _DocstringOfRecord:
+    """The docstring of a record, completed when somebody reads it."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.whole = text, ""
+
+    def __get__(self, instance: object, owner: type) -> str:
+        self.whole = self.whole or _documented(owner, self.text)
+        return self.whole
 
 
 def _documented(cls: type, doc: str) -> str:
@@ -316,7 +327,9 @@ def _normalised(who: str, name: str, value: object, rule: Param, kind: object) -
         if np.shape(value)[1:] == (0,) and ndim == 2:  # rows without a column
             return ((),) * len(value)
     if kind in (bool, "bool"):
-        return flag(who, name, value)
+        if not isinstance(value, bool | np.bool_):
+            raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
+        return bool(value)
     array = as_numbers(value)
     if array is None:
         raise ParameterError(f"{who} needs numbers for {name}, got {value!r}")
@@ -332,13 +345,6 @@ def _normalised(who: str, name: str, value: object, rule: Param, kind: object) -
             raise ParameterError(f"{who} needs an integer for {name}, got {value!r}")
         return int(array)
     return nested_tuple(array.tolist())
-
-
-def flag(who: str, name: str, value: object) -> bool:
-    """Return True or False."""
-    if not isinstance(value, bool | np.bool_):
-        raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
-    return bool(value)
 
 
 def integer(who: str, name: str, value: Any, at_least: int, at_most: float = math.inf) -> int:

@@ -22,7 +22,8 @@ import numpy as np
 import scipy
 
 from nlctl import wording
-from nlctl.reached import around, names_read
+from nlctl.expressions.source import codes_in
+from nlctl.native.purity.captured import in_cell
 
 _BUILTINS = ("isinstance", "issubclass", "type", "hasattr", "getattr", "setattr", "delattr",
              "vars", "dir", "callable", "repr", "str", "format", "ascii", "bytes", "memoryview",
@@ -99,7 +100,7 @@ def _reached(member: object) -> Iterator[Any]:
     elif isinstance(member, types.MethodType):
         yield member.__func__
         code = getattr(member.__func__, "__code__", None)
-        yield from _of_object(member.__self__, set(names_read(code)) if code else set())
+        yield from _of_object(member.__self__, _names(code) if code else set())
     elif isinstance(member, property):
         yield member.fget
     elif isinstance(member, functools.partial):
@@ -118,13 +119,15 @@ def _reached(member: object) -> Iterator[Any]:
 def _of_function(function: types.FunctionType) -> Iterator[Any]:
     """Yield its code, what it closes over and, of a user's, what it names."""
     yield getattr(function, "__wrapped__", None)
-    given = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
+    held = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
+    held += [in_cell(cell) for cell in function.__closure__ or ()]
     if is_of_library(function):
-        yield from (*given, *around(function, ()))
+        yield from held
         return
     yield function.__code__
-    names = set(names_read(function.__code__))
-    for thing in (*given, *around(function)):
+    names = _names(function.__code__)
+    held += [function.__globals__[name] for name in names & set(function.__globals__)]
+    for thing in held:
         yield thing
         yield from _of_object(thing, names)
 
@@ -151,7 +154,11 @@ def _of_object(owner: object, names: set[str]) -> Iterator[Any]:
             yield from _of_object(fields[name], names - {name})
         function = getattr(members[name], "fget", getattr(members[name], "__func__", members[name]))
         if isinstance(function, types.FunctionType):  # what it calls of its own object
-            waiting |= (set(names_read(function.__code__)) & set(members)) - done
+            waiting |= (_names(function.__code__) & set(members)) - done
+
+
+def _names(code: types.CodeType) -> set[str]:
+    return {name for part in codes_in(code) for name in part.co_names}
 
 
 def _question_in(code: types.CodeType) -> str | None:

@@ -10,7 +10,6 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..reached import around
 from ..upstream.control_internals import current_parameters
 from ..upstream.systems import System
 from .third_party import declared_keys
@@ -67,7 +66,20 @@ def _of_function(function: FunctionType) -> Iterator[Any]:
     yield from function.__defaults__ or ()
     yield from (function.__kwdefaults__ or {}).values()
     yield getattr(function, "__wrapped__", None)
-    yield from around(function)
+    for cell in function.__closure__ or ():
+        try:
+            yield cell.cell_contents
+        except ValueError:  # nothing in it yet
+            continue
+    for name in _names(function.__code__):
+        yield function.__globals__.get(name)
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for const in code.co_consts:
+        if isinstance(const, CodeType):
+            yield from _names(const)
 
 
 def _is_users(thing: object) -> bool:

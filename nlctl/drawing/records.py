@@ -15,7 +15,6 @@ FONT = "DejaVu Sans"  # comes with matplotlib, so a figure is the same on every 
 GRID, LANE_WIDTH, STUB, ROW_GAP, APART = 8.0, 9.0, 16.0, 24.0, 48.0
 EXTERNAL = -1  # in place of a wire: the arrow from or to the outside
 _Point = tuple[float, float]
-_LETTERS = 14  # of a line of names
 Links = set[tuple[int, int]]  # (source, target)
 Heights = Mapping[tuple[int, int], float]  # [block, wire]
 
@@ -101,7 +100,7 @@ class Layout:
     dots: tuple[_Point, ...]
 
 
-def bundle(names: Sequence[str]) -> str:
+def bundle(names: Sequence[str], letters: int = 14) -> str:
     """Write many names short: ``psi1 ... psi27`` for numbers in sequence, then a count."""
     runs: list[list[str]] = []
     for name in dict.fromkeys(names):
@@ -114,7 +113,7 @@ def bundle(names: Sequence[str]) -> str:
         words = [*words[:6], "...", words[-1], f"({len(set(names))} signals)"]
     # A name is never broken across lines, so its own spaces hide behind a letter meanwhile.
     text = ", ".join(word.replace(" ", "\xa0") for word in words).replace(", (", " (")
-    lines = textwrap.wrap(text, _LETTERS, break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(text, letters, break_long_words=False, break_on_hyphens=False)
     return "\n".join(lines).replace("\xa0", " ")
 
 

@@ -14,7 +14,7 @@ from nlctl.analysis.robustness.runs.identity import computing
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._version", "nlctl.host", "nlctl.upstream", "nlctl.attributes"],
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
-    + ["nlctl.equations", "nlctl.annotations", "nlctl.probing", "nlctl.pickles", "nlctl.reached"],
+    + ["nlctl.equations", "nlctl.annotations", "nlctl.probing", "nlctl.pickles"],
     [
         "nlctl.supplied",
         "nlctl.blocks",

@@ -35,8 +35,9 @@ from urllib.parse import unquote, urlparse
 import control as ct
 
 from nlctl.errors import ParameterError
+from nlctl.expressions.source import codes_in
 from nlctl.host.former_name import present_name
-from nlctl.reached import around, names_read
+from nlctl.native.purity.captured import in_cell
 
 from ..file.errors import Problem
 from ..file.schema import Study
@@ -380,9 +381,10 @@ def _uses_makers(member: object, seen: set[int]) -> bool:
     if not isinstance(member, FunctionType):
         module = type(member).__module__.partition(".")[0]
         return module not in sys.stdlib_module_names and _uses_makers(type(member), seen)
-    # names of modules among them: imported inside of the function
-    imported = {name.partition(".")[0] for name in names_read(member.__code__)}
-    reached = (part for part in around(member) if part is not None)
+    names = {name for code in codes_in(member.__code__) for name in code.co_names}
+    reached = [member.__globals__[name] for name in names if name in member.__globals__]
+    reached += [held for cell in member.__closure__ or () if (held := in_cell(cell)) is not None]
+    imported = {name.partition(".")[0] for name in names}  # inside of the function
     return bool(imported & set(MAKERS)) or any(_uses_makers(part, seen) for part in reached)
 
 

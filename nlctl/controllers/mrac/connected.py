@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import control as ct
 
@@ -84,11 +82,6 @@ def mrac(
     )
     pieces = {"model": model, "error": error, "basis": regressor, "weights": weights}
     pieces["law"] = ModelReferenceLaw() if law is None else law
-    return next_to_model(pieces, order, name)
-
-
-def next_to_model(pieces: Mapping[str, Any], order: int, name: str) -> ct.InterconnectedSystem:
-    """Connect the pieces of a controller of which a model of the plant is one."""
     return interconnect(
         pieces,
         inputs=[*coordinate_names(order), "yd"],

@@ -9,12 +9,13 @@ import control as ct
 import numpy as np
 
 from ...annotations import as_annotated
+from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
 from ...params import Floats, param, record
+from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from ..rbf import fitting_network
-from .connected import next_to_model
 from .laws import check_input_gain
 from .model_error import ModelError
 from .modified_weights import ProjectedWeights
@@ -166,4 +167,9 @@ def l1_adaptive(
     )
     error = ModelError(K=predictor.a, Q=(1.0,) * order) if error is None else error
     pieces = {"predictor": predictor, "error": error, "basis": regressor, "weights": weights}
-    return next_to_model(pieces | {"law": law}, order, name)
+    return interconnect(
+        {**pieces, "law": law},
+        inputs=[*coordinate_names(order), "yd"],
+        outputs=["e", "r", "u", "W_norm", *model_state_names(order)],
+        name=name,
+    )

@@ -27,8 +27,7 @@ import numpy as np
 
 from ...annotations import unreported
 from ...expressions.source import codes_in
-from ...reached import in_cell, names_read
-from ..purity.captured import held_attributes
+from ..purity.captured import held_attributes, in_cell
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
 
@@ -191,7 +190,7 @@ def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
     yield _code_text(function.__code__)
     for given in (function.__defaults__, function.__kwdefaults__):
         yield from _fingerprint(given, seen)
-    names = list(names_read(function.__code__))
+    names = _all_names(function.__code__)
     if "getattr" in names:
         names = sorted({*names, *_all_texts(function.__code__)})
     for cell in function.__closure__ or ():
@@ -387,6 +386,12 @@ def _code_parts(code: types.CodeType) -> Iterator[str]:
             yield from _code_parts(constant)
         else:
             yield _constant(constant)
+
+
+@functools.lru_cache(maxsize=4096)
+def _all_names(code: types.CodeType) -> list[str]:
+    """Return the global names of a code object and of those nested in it, in a fixed order."""
+    return sorted({name for part in codes_in(code) for name in part.co_names})
 
 
 def _constant(value: object) -> str:

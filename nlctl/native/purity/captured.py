@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from ...reached import in_cell
 from .values import PLAIN
 
 
@@ -60,6 +59,14 @@ class Captured:
             owner = owner.func
         name = getattr(owner, "__qualname__", "")
         return f"{name}.{self.name}" if name else self.name
+
+
+def in_cell(cell: CellType, empty: object = None) -> Any:
+    """Return what is in the cell of a closure, something else if it is not filled."""
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return empty
 
 
 def noted(holder: object, name: str, value: object) -> Captured:
