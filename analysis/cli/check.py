@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from nlctl.arguments import number
 from nlctl.diagrams import initial_state, state_names
-from nlctl.errors import ParameterError
 from nlctl.names import find_name
 from nlctl.response import input_output_response
 
@@ -32,8 +32,7 @@ def random_start(
     seed: int,
 ) -> dict[str, Any]:
     """Draw the plant's initial states, uniformly within `spread` of where it would start."""
-    if not 0 < spread < np.inf:
-        raise ParameterError(f"check needs a finite spread > 0, got {spread:g}")
+    number("check", "spread", spread, above=0)
     rng = np.random.default_rng(seed)
     nominal = dict(zip(state_names(diagram), initial_state(diagram, start), strict=True))
     full = {find_name("state", name, nominal): value for name, value in start.items()}

@@ -102,8 +102,9 @@ def closure(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants)
         )
         return _line("computed", other.room, f"{evidence}{other.C_0:.5g}")
     if other.status == "none closes":
+        weights = " and W" * (_given(constants) is None)
         evidence = (
-            f"none up to |x_i| <= {FARTHEST:g} closes, whatever Q{_weights(constants)}: each would "
+            f"none up to |x_i| <= {FARTHEST:g} closes, whatever Q{weights}: each would "
             f"hold {_sides_text(other.box)}, where C_0 is {other.C_0:.4g} at least; "
             f"on this box {here}"
         )
@@ -126,10 +127,6 @@ def _line(status: Any, room: float, evidence: str) -> Line:
 def _sides_text(reach: Sequence[float]) -> str:
     names = coordinate_names(len(reach))
     return ", ".join(f"|{x}| <= {a:.4g}" for x, a in zip(names, reach, strict=True))
-
-
-def _weights(constants: Constants) -> str:
-    return "" if _given(constants) is not None else " and W"
 
 
 def _given(constants: Constants) -> Any:

@@ -26,7 +26,6 @@ from .examination import U_MAX, Examination, examine
 from .inequalities import terms
 from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
 from .loop.signals import peak_by_rates
-from .loop.simulation import MemberRun
 from .nussbaum.slow_drift import SlowDrift
 from .premises import premises
 
@@ -211,7 +210,8 @@ def _assembled(study: Examination) -> Ledger:
             replayed = dataclasses.replace(line, member=number, replay=run.member.options)
             merged[line.key] = replayed.worse_of(merged.get(line.key))
         Q = float(np.maximum(Q, np.max(run.signals["I"])))
-        max_r = float(np.maximum(max_r, _largest_r(run, constants)))
+        x = terms(run.signals, premises(constants, run.gains))
+        max_r = float(np.maximum(max_r, peak_by_rates(run.signals.t, x.r, x.r_rate)))
         horizon, count = max(horizon, float(run.signals.t[-1])), count + 1
     lines = tuple(dataclasses.replace(line, runs=count) for line in merged.values())
     return Ledger(
@@ -225,8 +225,3 @@ def _assembled(study: Examination) -> Ledger:
         max_r=max_r,
         slow_drift=slow_drift_of(study.runs.first)[0],
     )
-
-
-def _largest_r(run: MemberRun, constants: Constants) -> float:
-    x = terms(run.signals, premises(constants, run.gains))
-    return peak_by_rates(run.signals.t, x.r, x.r_rate)

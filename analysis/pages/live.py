@@ -13,7 +13,7 @@ import control as ct
 import numpy as np
 
 from nlctl.diagrams import state_names
-from nlctl.export.web import Handle, WebProgram, check_linker, handles, web_program
+from nlctl.export.web import WebProgram, check_linker, handles, web_program
 from nlctl.faults.effects import NEVER
 from nlctl.plotting.bands import quantile, upper_envelope
 from nlctl.responses.arguments import state_array
@@ -73,7 +73,9 @@ def live_item(
     content = {
         "module": _packed([program.module]),
         "facts": program.facts,
-        "handles": [_plain(handle) for handle in moved],
+        "handles": [
+            {k: v for k, v in vars(handle).items() if v not in ("", None)} for handle in moved
+        ],
         "never": NEVER,
         "origin": origin,
         "outputs": list(program.outputs),
@@ -143,11 +145,6 @@ def live_numbers(program: WebProgram) -> dict[str, Any]:
         "rtol": program.facts["rtol"],
         "outputs": ends,
     }
-
-
-def _plain(handle: Handle) -> dict[str, Any]:
-    """Return a handle without what it has not."""
-    return {name: value for name, value in vars(handle).items() if value not in ("", None)}
 
 
 def _rows(

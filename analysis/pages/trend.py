@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .. import figures
-from ..report.document import Claim, Figure
+from ..report.document import Figure
 from ..report.outline import claim_status
 from ..report.trends import Trend
 
@@ -16,7 +16,10 @@ _ENDS = {
 
 def trend_figure(trend: Trend) -> Figure:
     """Return the figure: how each claim ended, and the first of the main numbers."""
-    claims = {name: [_end(claim) for claim in row] for name, row in trend.claims.items()}
+    claims = {  # how each ended, in one of the words of the figure
+        name: ["" if c is None else _ENDS.get(claim_status(c)[1], "open") for c in row]
+        for name, row in trend.claims.items()
+    }
     numbers = dict(list(trend.numbers.items())[:_DRAWN])
     ended = "; ".join(
         f"{name}: {', '.join(end or 'not made' for end in ends)}" for name, ends in claims.items()
@@ -27,8 +30,3 @@ def trend_figure(trend: Trend) -> Figure:
         description=f"Claims over {', '.join(trend.labels)}. {ended}",
         figure=figures.trend(trend.labels, claims, numbers),
     )
-
-
-def _end(claim: Claim | None) -> str:
-    """Return how a claim ended, in one of the words of the figure."""
-    return "" if claim is None else _ENDS.get(claim_status(claim)[1], "open")

@@ -11,9 +11,9 @@ def text_above(number: float | Fraction, digits: int = 6) -> str:
     return _text(number, Context(prec=digits, rounding=ROUND_CEILING))
 
 
-def text_below(number: float | Fraction, digits: int = 6) -> str:
+def text_below(number: float | Fraction) -> str:
     """Return the first digits of a number, rounded down: of a lower bound, or of a proved set."""
-    return _text(number, Context(prec=digits, rounding=ROUND_FLOOR))
+    return _text(number, Context(prec=6, rounding=ROUND_FLOOR))
 
 
 def exact_text(number: float | Fraction) -> str:

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from nlctl.annotations import as_annotated
-from nlctl.errors import ParameterError, UsageError
+from nlctl.arguments import number
+from nlctl.errors import UsageError
 
 from .outline import sort_key
 from .page import PARTS
@@ -86,7 +87,7 @@ def compare_contents(
     numbers.e: 0.14 -> 0.15
     []
     """
-    _check_tolerance(rtol)
+    number("compare", "rtol", rtol, at_least=0)
     return differing_numbers(read_report(first), read_report(second), rtol, common=common)
 
 
@@ -94,7 +95,7 @@ def differing_numbers(
     first: Mapping[str, Any], second: Mapping[str, Any], rtol: float = 0.0, *, common: bool = False
 ) -> list[Difference]:
     """Compare two reports as `compare_contents` does, given what is in their files."""
-    _check_tolerance(rtol)
+    number("compare", "rtol", rtol, at_least=0)
     both = set(first["sections"]) & set(second["sections"])
     one, two = (_flat(r, both if common else set(r["sections"])) for r in (first, second))
     return [
@@ -102,11 +103,6 @@ def differing_numbers(
         for where in dict.fromkeys([*one, *two])
         if where not in one or where not in two or not _same(one[where], two[where], rtol)
     ]
-
-
-def _check_tolerance(rtol: float) -> None:
-    if not 0 <= rtol < math.inf:
-        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
 
 
 def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
@@ -134,8 +130,8 @@ def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
         if key not in sections:
             continue
         tables = [item for item in section["items"] if item["kind"] == "table"]
-        for number, table in enumerate(tables, 1):
-            values |= _cells(f"section '{key}', table {number}", table)
+        for place, table in enumerate(tables, 1):
+            values |= _cells(f"section '{key}', table {place}", table)
     return values
 
 

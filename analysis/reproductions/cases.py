@@ -46,13 +46,12 @@ class PaperRun:
         return self.signals[name]
 
 
-def simulate_case(case: PaperCase, engine: str = "auto") -> PaperRun:
-    """Simulate a case, by either engine."""
+def simulate_case(case: PaperCase) -> PaperRun:
+    """Simulate a case."""
     loop = case.make()
     response = input_output_response(
-        loop, case.times, case.inputs, dict(case.start), rtol=case.rtol, atol=case.atol,
-        engine=engine,
-    )  # fmt: skip
+        loop, case.times, case.inputs, dict(case.start), rtol=case.rtol, atol=case.atol
+    )
     outputs = np.reshape(response.outputs, (len(loop.output_labels), -1))
     states = np.reshape(response.states, (len(state_names(loop)), -1))
     signals = dict(zip(loop.output_labels, outputs, strict=True))

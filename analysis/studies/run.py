@@ -22,7 +22,7 @@ from ..robustness.runs.store import StoreError, locked, parquet
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
 from .code.rule import remember_code
-from .file.schema import Study, keyed, study_data, to_toml
+from .file.schema import keyed, study_data, to_toml
 from .folder import checked, load_finding, load_run, load_study, save_finding
 from .intact.contents import seal, unseal
 from .kind import Ground, Setup, headed, unanswered
@@ -288,7 +288,8 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 "folder with --out"
             )
         kinds = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
-        changed = _changed(load_study(folder, kinds), file.study)
+        before, now = dict(load_study(folder, kinds)), dict(file.study)
+        changed = [name for name in now if before[name] != now[name]]
         if changed:
             raise RunFolderError(
                 f"'{folder}' holds a run of another study ({', '.join(changed)} differ): take "
@@ -304,10 +305,6 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
         )
     (folder / "run.json").unlink(missing_ok=True)  # of a run whose study is gone
     replace_file(path, lambda out: out.write(to_toml(file.study).encode()))
-
-
-def _changed(before: Study, now: Study) -> list[str]:
-    return [name for name in type(now).model_fields if getattr(before, name) != getattr(now, name)]
 
 
 def _stamped(setup: Setup, prepared: Prepared, folder: Path) -> dict[str, Any]:

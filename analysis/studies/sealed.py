@@ -89,7 +89,7 @@ _NOT_WRITTEN = (
 
 
 @contextmanager
-def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
+def as_written(what: str) -> Iterator[None]:
     """Refuse content that fits together and that no run writes: of other versions, or made up."""
     try:
         yield
@@ -97,7 +97,7 @@ def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
         raise
     except _NOT_WRITTEN as error:
         reason = f"{type(error).__name__}: {error}".partition("\n")[0][:200]
-        raise RunFolderError(f"{what} holds what no run writes ({reason}): {remedy}") from error
+        raise RunFolderError(f"{what} holds what no run writes ({reason}): {ANEW}") from error
 
 
 def digest_of(content: object) -> str:

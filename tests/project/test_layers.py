@@ -9,6 +9,8 @@ from graphlib import TopologicalSorter
 import pytest
 from places import ROOT
 
+from nlctl.analysis.robustness.runs.identity import computing
+
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._version", "nlctl.host", "nlctl.upstream", "nlctl.attributes"],
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
@@ -264,6 +266,29 @@ def test_nlctl_knows_nothing_of_analysis():
     """Blocks, diagrams and the engine can be used without it; the command is looked up by name."""
     below = [n for n in MEMBERS if not within(n, ["nlctl.analysis"])]
     assert {n for n in below for m in imports(n) if within(m, ["nlctl.analysis"])} == set()
+
+
+def reached(names):
+    """Return the modules that these import, and so on; packages that only re-export aside."""
+    waiting, seen = list(names), set()
+    while waiting:
+        name = waiting.pop()
+        if name not in seen and name in MEMBERS:
+            seen.add(name)
+            waiting += imports(name)
+    return seen
+
+
+def test_what_a_study_is_computed_by_is_in_the_key_of_its_versions():
+    """An edit of any of it makes results stale: of metrics, of makers of metrics, of kinds."""
+    counted = {module_name(path) for path, _ in computing()}
+    rooms = ["nlctl.analysis.metrics", "nlctl.analysis.robustness"]
+    every = reached(m for m in MEMBERS if within(m, rooms))
+    assert every - counted == set()
+    assert "nlctl.analysis.lyapunov.nussbaum.forecast" in every
+    studies = {m for m in MEMBERS if within(m, ["nlctl.analysis.studies", "nlctl.analysis.paper"])}
+    pages = {m for m in studies if within(m, ["nlctl.analysis.paper.page"])}
+    assert studies - counted == pages
 
 
 def test_the_recheck_knows_nothing_of_the_prover():

@@ -21,6 +21,7 @@ from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 
 _ROUNDING = 1e-12  # added to what double precision has summed up
+_SAMPLES = 4000  # of a period
 
 
 def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
@@ -82,7 +83,7 @@ def _dot(row: Sequence[arb], values: Sequence[arb | float]) -> arb:
 
 
 @functools.lru_cache(maxsize=32)
-def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[float, ...]:
+def reference_bounds(reference: SumOfSines) -> tuple[float, ...]:
     """Return sup |yd|, ..., sup |yd^(n)| over all time of a sum of sines."""
     # Where the frequencies, as the doubles that they are, have a common period of moderate length,
     # from samples of the reference's own equation over it: between two samples h apart a function
@@ -102,9 +103,9 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     if beats > 100:
         return tuple(largest[: n + 1])
     beats = int(beats)
-    h = 2 * np.pi / float(slowest) / (samples * beats)
+    h = 2 * np.pi / float(slowest) / (_SAMPLES * beats)
     p = equation_arguments(dataclasses.replace(reference, order=n + 1))
-    y = np.abs([reference.output(i * h, (), (), p) for i in range(samples * beats + 1)])
+    y = np.abs([reference.output(i * h, (), (), p) for i in range(_SAMPLES * beats + 1)])
     between = np.max(y[:, :-1] + y[:, 1:] * h / 2, axis=0)
     return tuple(
         min(float(between[k]) + largest[k + 2] * h * h / 8 + _ROUNDING, largest[k])

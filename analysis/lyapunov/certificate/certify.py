@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from nlctl.annotations import as_annotated
+from nlctl.arguments import integer, number
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
-from nlctl.params import integer
 
 from ...intervals.box import Box
 from ..attraction.barrier import BARRIER
@@ -141,8 +140,7 @@ def certify(
     """
     max_iterations = integer("certify", "max_iterations", max_iterations, at_least=1)
     for name, value in (("u_max", u_max), ("tol", tol)):
-        if not 0 < value < np.inf:
-            raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
+        number("certify", name, value, above=0)
     check_gain("certify", k)
     kind = next((kind for kind in PROOFS if kind.fits is not None and kind.fits(loop)), None)
     if W is not None and not (kind and kind.takes_W):

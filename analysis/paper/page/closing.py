@@ -94,7 +94,8 @@ def _apart(residuals: pd.DataFrame) -> Table:
 
 
 def _limits(runs: _Runs) -> Section:
-    drift = {n: _drift(runs[str(n)]) for n in (1, 2)}
+    late = {n: runs[str(n)].signals["zeta"][runs[str(n)].time >= TAIL] for n in (1, 2)}
+    drift = {n: float(zeta[-1] - zeta[0]) for n, zeta in late.items()}
     return Section(
         key="limits",
         title="Limitations",
@@ -112,7 +113,3 @@ def _limits(runs: _Runs) -> Section:
             ),
         ],
     )
-
-
-def _drift(run: PaperRun) -> float:
-    return float(run.signals["zeta"][-1] - run.signals["zeta"][run.time >= TAIL][0])

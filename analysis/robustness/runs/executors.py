@@ -73,7 +73,8 @@ def computed_elsewhere(
                 break
             ready, _ = wait(waiting, timeout=_LOOK, return_when=FIRST_COMPLETED)
             for future in ready:
-                numbers, error = waiting.pop(future), _failure(future)
+                numbers = waiting.pop(future)
+                error = CancelledError() if future.cancelled() else future.exception()
                 if error is None:
                     yield numbers, future.result()
                 else:
@@ -122,10 +123,6 @@ def _workers(executor: Executor) -> int:
     client: Any = getattr(executor, "_client", None)  # Dask's
     threads = sum(client.nthreads().values()) if client else 0
     return getattr(executor, "_max_workers", threads) or cores()
-
-
-def _failure(future: Future) -> BaseException | None:
-    return CancelledError() if future.cancelled() else future.exception()
 
 
 def _raise(numbers: range, error: BaseException) -> None:

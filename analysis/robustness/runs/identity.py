@@ -24,16 +24,10 @@ from ..uncertainty.space import Space
 from .experiment import Prepared
 
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
-COMPUTING = {
-    Path(errors.__file__).parent: ("**/*.py",),
-    Path(__file__).parents[2]: (
-        "robustness/**/*.py",
-        "studies/**/*.py",
-        "metrics/*.py",
-        "loop_record.py",
-    ),
+TELLING = {  # by the root of the modules: rooms that show numbers; all others may compute them
+    Path(errors.__file__).parent: ("analysis/", "drawing/"),
+    Path(__file__).parents[2]: ("cli/", "figures/", "pages/", "paper/page/", "recheck/", "report/"),
 }
-TOLD = ("drawing", "analysis")  # they compute nothing; what does of the last is listed
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 
 
@@ -89,14 +83,20 @@ def labels_text(labels: Mapping[str, str]) -> str:
 def versions_of_numbers() -> dict[str, str]:
     """Return the versions of all that computes numbers; nlctl's with a key of its source."""
     source = hashlib.sha256()
-    for root, parts in COMPUTING.items():
-        for path in (path for part in parts for path in sorted(root.glob(part))):
-            name = path.relative_to(root).as_posix()
-            if not name.startswith(TOLD):
-                source.update(f"{name}\0".encode() + path.read_bytes())
+    for path, name in computing():
+        source.update(f"{name}\0".encode() + path.read_bytes())
     version = f"{metadata.version('nlctl')} ({source.hexdigest()[:12]})"
     libraries = {name: metadata.version(name) for name in VERSIONS}
     return {"nlctl": version, **libraries, "python": platform.python_version()}
+
+
+def computing() -> Iterator[tuple[Path, str]]:
+    """Yield the files that numbers may come from, with their names below the root."""
+    for root, telling in TELLING.items():
+        for path in sorted(root.glob("**/*.py")):
+            name = path.relative_to(root).as_posix()
+            if not name.startswith(telling):
+                yield path, name
 
 
 def _quantity(quantity: Uncertain) -> dict[str, Any]:

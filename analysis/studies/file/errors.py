@@ -107,7 +107,7 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
         place = _in_file(one["loc"], data, absent)
         message = one["msg"][0].lower() + one["msg"][1:]
         if one["type"] == "extra_forbidden":
-            names = _keys_at(model, one["loc"][:-1])
+            names = [key for at in _models_at(model, one["loc"][:-1]) for key in at.model_fields]
             message = str(unknown("key", str(one["loc"][-1]), names))
             if len(one["loc"]) == 3 and one["loc"][0] == "space" and "." not in str(one["loc"][1]):
                 whole = ".".join(map(str, one["loc"][1:]))
@@ -149,11 +149,6 @@ def _in_file(loc: KeyPath, data: Any, absent: bool) -> KeyPath:
                 continue
         place.append(part)
     return tuple(place)
-
-
-def _keys_at(annotation: object, loc: KeyPath) -> list[str]:
-    """Return the fields of the models that a place of pydantic's leads to."""
-    return [name for model in _models_at(annotation, loc) for name in model.model_fields]
 
 
 def _models_at(annotation: object, loc: KeyPath) -> list[type[BaseModel]]:

@@ -92,7 +92,7 @@ def _experiment(asked: Faults, setup: Setup) -> Experiment:
     base, faults = setup.experiment, _faults(setup)
     options = {c.name: c.options[c.nominal] for c in base.space.choices}
     onsets = tuple(
-        Uncertain(name=_onset(fault), bounds=(0.0, NEVER), nominal=NEVER, unit="s")
+        Uncertain(name=f"{fault.name}.onset", bounds=(0.0, NEVER), nominal=NEVER, unit="s")
         for fault in faults.values()
     )
     space = replace(base.space, quantities=(*base.space.quantities, *onsets), choices=())
@@ -113,10 +113,6 @@ def _detectors(asked: Faults, experiment: Experiment) -> tuple[Requirement, ...]
         Requirement(key=name, formula=parse_formula(formula), until=end)
         for name, formula in asked.detects.items()
     )
-
-
-def _onset(fault: Fault) -> str:
-    return f"{fault.name}.onset"
 
 
 def _check(asked: Faults, setup: Setup) -> None:
