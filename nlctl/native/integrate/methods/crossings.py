@@ -98,12 +98,12 @@ def side_left_to(p, terms, row, j):
 def part_behind_root(p, h, terms, row, ends, rest, j):
     """Return right behind which part of a step h a polynomial is 0, by its values at both ends."""
     low, high = 0.0, 1.0
-    f_low, f_high = ends
+    (f_low, f_high), far = ends, ends[1]  # it may begin at 0
     for n in range(60):
         part = f_low / (f_low - f_high)
         middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
         f = value_and_slope(p, middle * h, terms, row, j)[0]
-        if opposite(f, -f_low):
+        if opposite(f, far):
             low, f_low = middle, f
         else:
             high, f_high = middle, f
