@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ...errors import ChatteringError
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
 from ..codegen.rewrite import computed_as_written
@@ -16,10 +17,11 @@ from .lines import Lines, NotLines, as_lines, levels_met, switches
 _GRID = 8192  # places at which a condition is looked at that is not made of lines
 _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
+_UNSEEN = 1e-3  # of a run: in what is shorter more switches do not count
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 
 _COUNTING, _PERIODIC = ("floor", "ceil", "trunc", "rint"), ("remainder", "fmod")
-_INSIDE = 0.382  # part of a cell: where it is looked at
+_INSIDE = (0.382, 0.73)  # parts of a cell: where it is looked at
 _STRAIGHT, _COUNTED = 0.1, 0.25  # of values, and of what counts: how far they may be from a line
 _FINEST = 1e-13  # of the times: no cell is cut that is shorter
 _PIECES = 16  # of a cell in which they are farther, or count by more than one
@@ -72,9 +74,7 @@ def break_points(
         for k, level in enumerate(levels):
             indicator: Indicator = partial(level, values)
             if crossed is None:
-                compared = partial(_compared, condition, k, values)
-                counts = condition.op in (*_COUNTING, *_PERIODIC)
-                at = _sought(indicator, compared, span, fastest, counts)
+                at = _searched(indicator, condition, k, values, (span, fastest))
                 for factor in conditions[condition]:
                     of_factor = partial(_factor, factor, values)
                     roots = _sought(partial(_is_below, of_factor), of_factor, span, fastest)
@@ -221,28 +221,39 @@ def _straight(t: np.ndarray, compared: Indicator, counts: bool) -> np.ndarray:
     """
     values = compared(t)
     while True:
-        length = np.diff(t)
-        inside = t[:-1] + _INSIDE * length
-        here = compared(inside)
+        length, rise = np.diff(t), np.diff(values)
+        inner = [compared(t[:-1] + part * length) for part in _INSIDE]
         with np.errstate(all="ignore"):
-            off = np.abs(here - (values[:-1] + _INSIDE * np.diff(values)))
-            size = np.maximum(np.abs(here), np.maximum(np.abs(values[:-1]), np.abs(values[1:])))
-            bent = off > (_COUNTED if counts else _STRAIGHT * size)
-            bent |= np.abs(np.diff(_side(values, counts))) > (1.0 if counts else 2.0)
-            bent &= length > _FINEST * np.abs(t[[0, -1]]).max()
+            size = np.abs([*inner, values[:-1], values[1:]]).max(axis=0)
+            bent = np.abs(np.diff(_side(values, counts))) > (1.0 if counts else 2.0)
+            for part, here in zip(_INSIDE, inner, strict=True):
+                off = np.abs(here - (values[:-1] + part * rise))
+                bent |= off > (_COUNTED if counts else _STRAIGHT * size)
+        bent[1:-1] |= bent[2:] | bent[:-2]  # what seems straight beside it may be whole waves
+        bent &= length > _FINEST * np.abs(t[[0, -1]]).max()
         if not bent.any() or t.size + _PIECES * bent.sum() > _MOST:
-            break
+            if length[bent].sum() > _UNSEEN * (t[-1] - t[0]):
+                raise _too_many(float(t[:-1][bent][0]))
+            return np.union1d(t, _dips(t, values, inner[0], counts))
         parts = np.arange(1, _PIECES) / _PIECES
         more = (t[:-1][bent, None] + length[bent, None] * parts).ravel()
         order = np.argsort(np.concatenate([t, more]), kind="stable")
         t = np.concatenate([t, more])[order]
         values = np.concatenate([values, compared(more)])[order]
-    return np.union1d(t, _dips(t, (values, here), counts))
 
 
-def _dips(t: np.ndarray, values: tuple[np.ndarray, np.ndarray], counts: bool) -> np.ndarray:
+def _too_many(t: float) -> ChatteringError:
+    """Return the error of a run that a condition of time alone keeps from its end."""
+    words = (
+        f"a condition of time alone switches too fast to be located from t = {t:.6g} s on, {_MOST} "
+        "times or more in the run: make it slower, let a clock sample it, or end the run before"
+    )
+    return ChatteringError(words, t)
+
+
+def _dips(t: np.ndarray, ends: np.ndarray, here: np.ndarray, counts: bool) -> np.ndarray:
     """Return times at which a parabola is on another side than at both ends of its cell."""
-    (ends, here), c = values, _INSIDE
+    c = _INSIDE[0]
     with np.errstate(all="ignore"):
         rise, inner = np.diff(ends), here - ends[:-1]
         bend = (inner - c * rise) / (c * (c - 1.0))
@@ -261,6 +272,18 @@ def _exact(indicator: Indicator, places: np.ndarray, span: tuple[float, float]) 
     gaps = np.diff(places)
     width = min(width, 0.25 * gaps.min()) if gaps.size else width
     return _bisected(indicator, places - width, places + width, places)
+
+
+def _searched(
+    indicator: Indicator,
+    condition: Expr,
+    k: int,
+    values: Values,
+    where: tuple[tuple[float, float], float],  # times of the run, and the fastest sine
+) -> np.ndarray:
+    """Return where an element of a condition changes."""
+    compared = partial(_compared, condition, k, values)
+    return _sought(indicator, compared, *where, condition.op in (*_COUNTING, *_PERIODIC))
 
 
 def _sought(
@@ -288,12 +311,11 @@ def _bisected(
     before, after = indicator(low), indicator(high)
     changes = before != after
     low, high = low.copy(), high.copy()
-    for _ in range(1100):
-        middle = 0.5 * (low + high)
-        inside = (middle > low) & (middle < high) & changes
-        if not inside.any():
-            break
-        same = indicator(middle) == before
-        low = np.where(inside & same, middle, low)
-        high = np.where(inside & ~same, middle, high)
+    open_ = np.flatnonzero(changes)
+    while open_.size:  # next to 0 numbers are close together
+        middle = 0.5 * (low[open_] + high[open_])
+        inside = (middle > low[open_]) & (middle < high[open_])
+        open_, middle = open_[inside], middle[inside]
+        same = indicator(middle) == before[open_]
+        low[open_[same]], high[open_[~same]] = middle[same], middle[~same]
     return high[changes] if otherwise is None else np.where(changes, high, otherwise)

@@ -95,6 +95,15 @@ def side_left_to(p, terms, row, j):
 
 
 @numba.njit(**INNER)
+def falls_at_once(task, w, i, j):
+    """Whether a guard begins at 0 and falls from there: no polynomial says how far behind it is."""
+    # `crossing` looks right behind the start then, as with other methods.
+    row, p = w.x.shape[0] + i, task.taylor.highest - 1
+    begins = i >= task.rows.guarded and w.events.g_start[i, j] == 0.0
+    return begins and side_left_to(p, w.taylor.terms, row, j) < 0.0
+
+
+@numba.njit(**INNER)
 def part_behind_root(p, h, terms, row, ends, rest, j):
     """Return right behind which part of a step h a polynomial is 0, by its values at both ends."""
     low, high = 0.0, 1.0

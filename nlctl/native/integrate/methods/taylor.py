@@ -37,6 +37,7 @@ from .carried import (
 )
 from .crossings import (
     PLACES_LOOKED_AT,
+    falls_at_once,
     first_crossing,
     followed_part,
     is_at,
@@ -263,9 +264,7 @@ def _aim(task, lanes, w):
         if lane.tries == 0:
             lane.at_once = 0.0
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
-            if _falls_at_once(task, w, i, j):
-                continue  # `crossing` looks right behind the start
-            if _meets(task, w, i, w.ahead.g[i, j], j):
+            if _meets(task, w, i, w.ahead.g[i, j], j) and not falls_at_once(task, w, i, j):
                 ends = w.events.g_start[i, j], w.ahead.g[i, j]
                 root = part_behind_root(
                     task.taylor.highest - 1, lane.step, w.taylor.terms, w.x.shape[0] + i, ends,
@@ -306,14 +305,6 @@ def _meets(task, w, i, end, j):
     if task.rows.bending <= i < task.rows.declared and small:
         return False  # see `first_root`
     return triggered(w.events.g_start[i, j], end, w.events.behind[i, j] != 0.0)
-
-
-@numba.njit(**INNER)
-def _falls_at_once(task, w, i, j):
-    """Whether a guard begins at 0 and falls from there: no polynomial says how far behind it is."""
-    row, p = w.x.shape[0] + i, task.taylor.highest - 1
-    begins = i >= task.rows.guarded and w.events.g_start[i, j] == 0.0
-    return begins and side_left_to(p, w.taylor.terms, row, j) < 0.0
 
 
 @numba.njit(**INNER)
