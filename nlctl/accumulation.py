@@ -20,8 +20,8 @@ from itertools import pairwise
 import numpy as np
 
 __all__ = [
-    "AT_LEAST", "EVER_FASTER", "PACE", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of",
-    "jumps_end", "limit_of", "reached", "tolerance_of",
+    "AT_LEAST", "EVER_FASTER", "PACE", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words",
+    "crowd_of", "jumps_end", "limit_of", "reached", "tolerance_of",
 ]  # fmt: skip
 
 AT_LEAST = 5  # switches that are examined

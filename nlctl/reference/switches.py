@@ -46,8 +46,8 @@ class Switches:
         self._name, self._label, self._ends, self._tolerances = name, label, ends, tolerances
         self._last: deque[float] = deque(maxlen=_CROWD)
         self._times: defaultdict[int, list[float]] = defaultdict(list)
-        # the last two switches of each condition: one wave may be cut close to its peak
         self._first: dict[int, Switch] = {}
+        # the last two switches of each condition: one wave may be cut close to its peak
         self._before: defaultdict[int, deque[Switch]] = defaultdict(lambda: deque(maxlen=2))
 
     def note(self, i: int, t: float) -> None:
