@@ -134,7 +134,7 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
     """Return the last jump in the steps of a lane, if they do not come away from it."""
     task = run.task
     free = [a for a in reversed(attempts) if a.free[j]]
-    if len(free) < _JUMPS:
+    if len(free) < _JUMPS or not attempts[0].x.size:
         return None
     slopes = _slopes(run, attempts, j)
     states = np.array([a.x[:, j] for a in attempts])
