@@ -20,8 +20,8 @@ from itertools import pairwise
 import numpy as np
 
 __all__ = [
-    "AT_LEAST", "PACE", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of",
-    "jumps_end", "limit_of", "reached", "tolerance_of",
+    "AT_LEAST", "EVER_FASTER", "PACE", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words",
+    "crowd_of", "jumps_end", "limit_of", "reached", "tolerance_of",
 ]  # fmt: skip
 
 AT_LEAST = 5  # switches that are examined
@@ -30,6 +30,10 @@ SECOND_ORDER = (
     "what switches does not reach the rate of what is compared, and cannot hold it at 0 (second-"
     "order sliding): give it hysteresis (nlctl.Relay), smooth it over a small width, make a sign "
     "an nlctl.IdealRelay with a larger rest_rate, or let the run end before"
+)
+EVER_FASTER = (
+    "what is compared moves ever faster: have it counted by something smooth, stop it where it is "
+    "too fast, or let the run end before"
 )
 _LOCATED = 50.0  # relative tolerances by which periods fall at least; switches are located to 10
 _SUDDEN = 0.02  # of the ratio of two periods: the next one, in a sequence
@@ -111,14 +115,16 @@ def tolerance_of(value: StateValue, t: float, x: np.ndarray, away: np.ndarray) -
     return float(sum(abs(value(t, x + away[i] * (np.arange(x.size) == i)) - here) for i in places))
 
 
-def accumulation_words(which: tuple[str, str], crowd: Crowd, beyond: str) -> str:
+def accumulation_words(
+    which: tuple[str, str], crowd: Crowd, beyond: str, reason: str = SECOND_ORDER
+) -> str:
     """Return whose switches accumulate, and how."""
     whose = f"block '{which[0]}' ({which[1]})" if which[0] else which[1]
     left = f"{crowd.more:.2g}" if np.isfinite(crowd.more) else "no end of them"
     where = f"near t = {crowd.end:.6g} s" if crowd.ratio < _FINITE else "ever faster"
     return (
         f"the switches of {whose} accumulate {where}: two of them in {crowd.period:.3g} s at "
-        f"t = {crowd.last:.6g} s, {left} to come, {beyond}; {SECOND_ORDER}"
+        f"t = {crowd.last:.6g} s, {left} to come, {beyond}; {reason}"
     )
 
 

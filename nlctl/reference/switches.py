@@ -9,6 +9,8 @@ import numpy as np
 
 from ..accumulation import (
     AT_LEAST,
+    EVER_FASTER,
+    SECOND_ORDER,
     WITHIN,
     Crowd,
     StateValue,
@@ -25,6 +27,7 @@ _MANY = 200  # switches of one condition, from which on their pace alone says wh
 _LOOKED_AT = 100  # switches, after each of which it is asked whether there are ever more
 _AT_ONCE = 1e-10  # of a run: two switches that are no further apart are at one place
 _NOTHING = "and what is compared is within tolerances of 0"
+_GROWS = 10.0  # times as fast as at the first switch
 _MORE = 1e4  # switches to come that are too many: each takes tens of milliseconds
 
 Switch = tuple[float, np.ndarray, np.ndarray]  # time (s), state and rates right behind it
@@ -43,6 +46,7 @@ class Switches:
         self._name, self._label, self._ends, self._tolerances = name, label, ends, tolerances
         self._last: deque[float] = deque(maxlen=_CROWD)
         self._times: defaultdict[int, list[float]] = defaultdict(list)
+        self._first: dict[int, Switch] = {}
         # the last two switches of each condition: one wave may be cut close to its peak
         self._before: defaultdict[int, deque[Switch]] = defaultdict(lambda: deque(maxlen=2))
 
@@ -71,7 +75,8 @@ class Switches:
         if small and self._are_small(value, t, two):
             if small.period < _AT_ONCE * np.ptp(self._ends):
                 raise self._chattering(t, self._over_and_over(i, 3))
-            raise self._accumulate(small, t, _NOTHING)
+            raise self._accumulate(small, t, _NOTHING, value)
+        self._first.setdefault(i, (t, x, rates))
         if len(times) % _LOOKED_AT == 0:
             self._check_pace(i, t, value)
         two.append((t, x, rates))
@@ -85,7 +90,7 @@ class Switches:
         if len(times) >= _MANY:
             more = crowd_of(np.array(times[-len(times) // 2 :]), i, end, np.inf, _MORE)
             if more:
-                raise self._accumulate(more, t, "too many for engine='python-control'")
+                raise self._accumulate(more, t, "too many for engine='python-control'", value)
 
     def _over_and_over(self, i: int, count: int) -> str:
         """Say that a condition is at one place, to its tolerances."""
@@ -104,8 +109,17 @@ class Switches:
             for (t, x, rates), until in zip(two, ends, strict=True)
         )
 
-    def _accumulate(self, crowd: Crowd, t: float, beyond: str) -> ChatteringError:
-        return self._chattering(t, accumulation_words(self._label(crowd.row), crowd, beyond))
+    def _accumulate(
+        self, crowd: Crowd, t: float, beyond: str, value: StateValue
+    ) -> ChatteringError:
+        """Say that switches come ever closer together: where it moves slower, or moves faster."""
+        i, ahead = crowd.row, 1e-3 * crowd.period
+        first, last = (
+            abs(value(s + ahead, x + ahead * rates) - value(s, x))
+            for s, x, rates in (self._first[i], self._before[i][-1])
+        )
+        reason = EVER_FASTER if last > _GROWS * first else SECOND_ORDER
+        return self._chattering(t, accumulation_words(self._label(i), crowd, beyond, reason))
 
     def _chattering(self, t: float, words: str) -> ChatteringError:
         return ChatteringError(f"'{self._name}' is chattering at t = {t:.6g} s: {words}", t)

@@ -138,3 +138,53 @@ def test_places_that_lie_close_together_do_not_accumulate():
         nearest, [0, 3.5], 0, [0, 0], engine="python-control", rtol=1e-6, atol=1e-8
     )
     assert run.states[1, -1] == pytest.approx(5e3 * (2.0001 - 1.0001), rel=1e-6)
+
+
+methods = pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+
+
+@methods
+def test_a_run_slides_where_the_shortest_steps_are_lost_in_the_rounding_of_a_state(method):
+    """Rates lead back from both sides, slowly from one: 1e-16 s of that move no last digit."""
+
+    def flow(t, x, u, params):
+        high = np.where(2 * x[1] ** 2 - 0.623 >= 0.199, np.sin(4.614 * t + 0.532), -0.978)
+        places, heights = [-1.0, -0.2, 0.093, 0.7, 1.2], [0.726, -0.778, 0.476, -0.072, 0.342]
+        near = np.where(x[1] >= 0.099, np.sin(4.853 * t - 0.7), 0.059)
+        x2 = -2.0 * x[0] - 0.2 * x[1] + 0.819 * high + 0.257 * near
+        return [x[1] + 0.885 * np.interp(x[1], places, heights), x2]
+
+    with pytest.raises(nlctl.errors.ChatteringError) as ended:
+        nlctl.input_output_response(own(flow, 2), [0, 6.0], 0, [0.6, -0.3], method=method,
+                                    max_steps=20_000, rtol=1e-8, atol=1e-10)  # fmt: skip
+    assert ended.value.time == pytest.approx(0.195423, abs=1e-5)
+
+
+@methods
+@pytest.mark.parametrize(
+    ("rate", "start", "end", "slides"),
+    [
+        # from 16.5003 down to 16.5 at 1e-4, and held there
+        (lambda t, x: np.where(x > 16.5, -1e-4, 1e-4), 16.5003, 100.0, 3.0),
+        (lambda t, x: np.where(x > t, 0.5, 2.0), 1.0, 4.0, 2.0),  # x = 1 + t / 2 comes to t
+        (lambda t, x: 0.5 - np.floor(x), 0.3, 4.0, 1.4),  # long steps lead far up the staircase
+    ],
+    ids=["slowly", "along time", "at a stair"],
+)
+def test_a_run_that_slides_ends_with_the_reason(method, rate, start, end, slides):
+    slider = own(lambda t, x, u, p: [rate(t, x[0])], 1)
+    with pytest.raises(nlctl.errors.ChatteringError) as ended:
+        nlctl.input_output_response(slider, [0, end], 0, [start], method=method,
+                                    max_steps=200_000, rtol=1e-9, atol=1e-11)  # fmt: skip
+    assert ended.value.time == pytest.approx(slides, abs=1e-3)
+
+
+def test_what_is_counted_ever_faster_is_not_said_to_slide():
+    """1 / (1 - x) passes ever more integers before x = 1."""
+    counter = own(lambda t, x, u, p: [1.0, np.floor(1 / (1 - x[0]))], 2)
+    with pytest.raises(nlctl.errors.ChatteringError, match="moves ever faster") as ended:
+        nlctl.input_output_response(
+            counter, [0, 2.0], 0, [0.0, 0.0], engine="python-control", rtol=1e-6, atol=1e-8
+        )
+    assert ended.value.time < 1.0
+    assert "second-order" not in str(ended.value)

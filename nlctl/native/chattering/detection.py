@@ -88,13 +88,15 @@ def probe_of(task: Task) -> int:
 def snapshot(work: Work, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
     """Try one step; return what `advance` returns, and the step."""
     t, x, first = work.lanes["t"].copy(), work.x.copy(), work.k[0].copy()
+    lane = work.lanes[0]
+    stiff = lane["stiff"] != 0 and not (lane["cross"] > 0.0 and lane["tries"] == 0)
     run = advance()
     w = run.work
     lanes = w.t.size
     moved = w.lanes["t"] > t
     return run, Attempt(
         t=t, x=x, first=first, x_new=w.x_new.copy(), h=w.hh[:lanes].copy(), k=w.k.copy(),
-        u=w.u.copy(), stiff=bool(w.lanes["stiff"][0]), free=~(moved & (w.lanes["ends"] != 0)),
+        u=w.u.copy(), stiff=bool(stiff), free=~(moved & (w.lanes["ends"] != 0)),
     )  # fmt: skip
 
 
@@ -132,10 +134,9 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
     """Return the last jump in the steps of a lane, if they do not come away from it."""
     task = run.task
     free = [a for a in reversed(attempts) if a.free[j]]
-    if len(free) < _JUMPS:
+    if len(free) < _JUMPS or not attempts[0].x.size:
         return None
-    slopes = np.concatenate([a.k[:, :, j] for a in attempts])
-    slopes = slopes[np.isfinite(slopes).all(axis=1)]
+    slopes = _slopes(run, attempts, j)
     states = np.array([a.x[:, j] for a in attempts])
     if not slopes.size or not np.isfinite(states).all():
         return None
@@ -160,6 +161,18 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
         if found == _JUMPS:
             return last
     return None
+
+
+def _slopes(run: Any, attempts: list[Attempt], j: int) -> np.ndarray:
+    """Return the rates of a lane at the stages of steps that are about as long as those it makes.
+
+    Longer ones, which it tries again and again, may lead far up a staircase.
+    """
+    gone = run.lanes["t"][j] - attempts[0].t[j]
+    longest = _FARTHER * gone / np.unique([a.t[j] for a in attempts]).size
+    near = [a for a in attempts if a.h[j] <= longest]
+    slopes = np.concatenate([a.k[:, :, j] for a in near or attempts])
+    return slopes[np.isfinite(slopes).all(axis=1)]
 
 
 @dataclass(frozen=True, kw_only=True)

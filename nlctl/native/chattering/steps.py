@@ -82,10 +82,7 @@ class LaneEquations:
         j, h = self.j, attempt.h[self.j]
         t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.pair.A, self.run.task.pair.C
         yield t, x
-        if attempt.stiff:
-            yield t, attempt.x_new[:, j]
-            return
-        if attempt.k.shape[0] != C.size:  # of Taylor's method
+        if attempt.stiff or attempt.k.shape[0] != C.size:  # or of Taylor's method
             yield t + h, attempt.x_new[:, j]
             return
         slopes = np.vstack([attempt.first[None, :, j], attempt.k[1:, :, j]])

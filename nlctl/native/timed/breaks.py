@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ...errors import ChatteringError
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
 from ..codegen.rewrite import computed_as_written
@@ -16,8 +17,14 @@ from .lines import Lines, NotLines, as_lines, levels_met, switches
 _GRID = 8192  # places at which a condition is looked at that is not made of lines
 _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
+_UNSEEN = 1e-3  # of a run: in what is shorter more switches do not count
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 
+_COUNTING, _PERIODIC = ("floor", "ceil", "trunc", "rint"), ("remainder", "fmod")
+_INSIDE = (0.382, 0.73)  # parts of a cell: where it is looked at
+_STRAIGHT, _COUNTED = 0.1, 0.25  # of values, and of what counts: how far they may be from a line
+_FINEST = 1e-13  # of the times: no cell is cut that is shorter
+_PIECES = 16  # of a cell in which they are farther, or count by more than one
 _SAME = 1e-12  # of the times: places that are one
 _ROUNDINGS = 8  # ways of rounding in which a condition must agree on either side of its switch
 _WIDER = 4.0
@@ -67,7 +74,7 @@ def break_points(
         for k, level in enumerate(levels):
             indicator: Indicator = partial(level, values)
             if crossed is None:
-                at = _sought(indicator, partial(_compared, condition, k, values), span, fastest)
+                at = _searched(indicator, condition, k, values, (span, fastest))
                 for factor in conditions[condition]:
                     of_factor = partial(_factor, factor, values)
                     roots = _sought(partial(_is_below, of_factor), of_factor, span, fastest)
@@ -146,9 +153,9 @@ def _level(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray
     """Return the indicator of an element."""
     op, args, element = condition.op, condition.args, partial(_element, k, t)
     with np.errstate(all="ignore"):
-        if condition.kind == "b" or op in ("floor", "ceil", "trunc", "rint", "sign", "heaviside"):
+        if condition.kind == "b" or op in (*_COUNTING, "sign", "heaviside"):
             return element(values([condition], t)[0]).astype(float)
-        if op in ("remainder", "fmod"):
+        if op in _PERIODIC:
             rest, by = map(element, values([condition, args[1]], t))
             return (np.abs(rest) > 0.5 * np.abs(by)).astype(float)
         if op in ("minimum", "maximum"):
@@ -165,14 +172,16 @@ def _element(k: int, t: np.ndarray, array: np.ndarray) -> np.ndarray:
 
 
 def _compared(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray:
-    """Return what an element of a condition compares with 0, as far as that is a difference."""
-    args = condition.args
+    """Return what an element of a condition compares with 0, or counts, as far as that is known."""
+    op, args, element = condition.op, condition.args, partial(_element, k, t)
     with np.errstate(all="ignore"):
-        if condition.op in ("abs", "sign", "heaviside"):
-            return _element(k, t, values([args[0]], t)[0])
-        if len(args) == 2 and condition.op not in ("remainder", "fmod", "copysign"):
-            a, b = (_element(k, t, array) for array in values(list(args), t))
-            return a * 1.0 - b * 1.0
+        if op in ("abs", "sign", "heaviside", *_COUNTING):
+            return element(values([args[0]], t)[0]) * 1.0 - 0.5 * (op == "rint")
+        if op == "copysign":
+            return element(values([args[1]], t)[0]) * 1.0
+        if len(args) == 2:
+            a, b = map(element, values(list(args), t))
+            return 2.0 * a / b if op in _PERIODIC else a * 1.0 - b * 1.0
     return np.ones(t.size)
 
 
@@ -200,18 +209,59 @@ def _with_roots(
     return np.union1d(at, more[apart > _SAME * scale])
 
 
-def _dips(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return times at which a parabola through three values is on another side than they are.
+def _side(values: np.ndarray, counts: bool) -> np.ndarray:
+    """Return between which two switches values lie."""
+    return np.floor(values) if counts else np.sign(values)
 
-    A quadratic function is that parabola, however narrow it dips.
+
+def _straight(t: np.ndarray, compared: Indicator, counts: bool) -> np.ndarray:
+    """Return times between any two of which what is compared is nearly a parabola.
+
+    Also where this is on another side than at the times next to it, however narrow it dips.
     """
-    before, here, behind = values[:-2], values[1:-1], values[2:]
+    values = compared(t)
+    while True:
+        length, rise = np.diff(t), np.diff(values)
+        inner = [compared(t[:-1] + part * length) for part in _INSIDE]
+        with np.errstate(all="ignore"):
+            size = np.abs([*inner, values[:-1], values[1:]]).max(axis=0)
+            bent = np.abs(np.diff(_side(values, counts))) > (1.0 if counts else 2.0)
+            for part, here in zip(_INSIDE, inner, strict=True):
+                off = np.abs(here - (values[:-1] + part * rise))
+                bent |= off > (_COUNTED if counts else _STRAIGHT * size)
+        bent[1:-1] |= bent[2:] | bent[:-2]  # what seems straight beside it may be whole waves
+        bent &= length > _FINEST * np.abs(t[[0, -1]]).max()
+        if not bent.any() or t.size + _PIECES * bent.sum() > _MOST:
+            if length[bent].sum() > _UNSEEN * (t[-1] - t[0]):
+                raise _too_many(float(t[:-1][bent][0]))
+            return np.union1d(t, _dips(t, values, inner[0], counts))
+        parts = np.arange(1, _PIECES) / _PIECES
+        more = (t[:-1][bent, None] + length[bent, None] * parts).ravel()
+        order = np.argsort(np.concatenate([t, more]), kind="stable")
+        t = np.concatenate([t, more])[order]
+        values = np.concatenate([values, compared(more)])[order]
+
+
+def _too_many(t: float) -> ChatteringError:
+    """Return the error of a run that a condition of time alone keeps from its end."""
+    words = (
+        f"a condition of time alone switches too fast to be located from t = {t:.6g} s on, {_MOST} "
+        "times or more in the run: make it slower, let a clock sample it, or end the run before"
+    )
+    return ChatteringError(words, t)
+
+
+def _dips(t: np.ndarray, ends: np.ndarray, here: np.ndarray, counts: bool) -> np.ndarray:
+    """Return times at which a parabola is on another side than at both ends of its cell."""
+    c = _INSIDE[0]
     with np.errstate(all="ignore"):
-        slope, bend = 0.5 * (behind - before), behind - 2.0 * here + before
-        at, least = -slope / bend, here - 0.5 * slope**2 / bend
-        crosses = (np.abs(at) <= 1.0) & (here * before > 0.0) & (here * behind > 0.0)
-        crosses &= least * here < 0.0
-    return t[1:-1][crosses] + at[crosses] * (t[1] - t[0])
+        rise, inner = np.diff(ends), here - ends[:-1]
+        bend = (inner - c * rise) / (c * (c - 1.0))
+        at = 0.5 - 0.5 * rise / bend
+        least = ends[:-1] + at * (rise - bend) + at**2 * bend
+        side, other = _side(ends, counts), _side(least, counts)
+        crosses = (at > 0.0) & (at < 1.0) & (side[1:] == side[:-1]) & (other != side[1:])
+    return t[:-1][crosses] + at[crosses] * np.diff(t)[crosses]
 
 
 def _exact(indicator: Indicator, places: np.ndarray, span: tuple[float, float]) -> np.ndarray:
@@ -224,14 +274,29 @@ def _exact(indicator: Indicator, places: np.ndarray, span: tuple[float, float]) 
     return _bisected(indicator, places - width, places + width, places)
 
 
-def _sought(
-    indicator: Indicator, compared: Indicator, span: tuple[float, float], fastest: float
+def _searched(
+    indicator: Indicator,
+    condition: Expr,
+    k: int,
+    values: Values,
+    where: tuple[tuple[float, float], float],  # times of the run, and the fastest sine
 ) -> np.ndarray:
-    """Return where an indicator changes on a grid that is fine enough for its fastest sine."""
+    """Return where an element of a condition changes."""
+    compared = partial(_compared, condition, k, values)
+    return _sought(indicator, compared, *where, condition.op in (*_COUNTING, *_PERIODIC))
+
+
+def _sought(
+    indicator: Indicator,
+    compared: Indicator,
+    span: tuple[float, float],
+    fastest: float,
+    counts: bool = False,  # whether it changes at integers
+) -> np.ndarray:
+    """Return where an indicator changes on a grid that is fine enough for what is compared."""
     waves = fastest * (span[1] - span[0]) / (2.0 * np.pi)
     count = int(min(max(_GRID, _PER_WAVE * waves), _MOST))
-    t = np.linspace(*span, count + 1)
-    t = np.union1d(t, _dips(t, compared(t)))
+    t = _straight(np.linspace(*span, count + 1), compared, counts)
     level = indicator(t)
     at = np.flatnonzero(level[1:] != level[:-1])
     return _bisected(indicator, t[at], t[at + 1], None)
@@ -246,12 +311,11 @@ def _bisected(
     before, after = indicator(low), indicator(high)
     changes = before != after
     low, high = low.copy(), high.copy()
-    for _ in range(1100):
-        middle = 0.5 * (low + high)
-        inside = (middle > low) & (middle < high) & changes
-        if not inside.any():
-            break
-        same = indicator(middle) == before
-        low = np.where(inside & same, middle, low)
-        high = np.where(inside & ~same, middle, high)
+    open_ = np.flatnonzero(changes)
+    while open_.size:  # next to 0 numbers are close together
+        middle = 0.5 * (low[open_] + high[open_])
+        inside = (middle > low[open_]) & (middle < high[open_])
+        open_, middle = open_[inside], middle[inside]
+        same = indicator(middle) == before[open_]
+        low[open_[same]], high[open_[~same]] = middle[same], middle[~same]
     return high[changes] if otherwise is None else np.where(changes, high, otherwise)

@@ -66,6 +66,47 @@ def test_a_level_that_steps_end_at_by_rounding_is_crossed(method, rtol):
     assert made.events["time"][0] == pytest.approx(np.arccos(1 - 1e-6), abs=1e-9)
 
 
+@nlctl.record
+class Room:
+    """A room that cools down to 16.5, and is at 17 at once."""
+
+    inputs, outputs, states, feedthrough = (), ("h",), ("h",), False
+    initial = {"h": 16.5}
+    update = staticmethod(nlctl.equation(lambda t, x, u, p: (10.0 - x[0],)))
+    output = staticmethod(nlctl.equation(lambda t, x, u, p: (x[0],)))
+    guard = staticmethod(nlctl.equation(lambda t, x, u, p: (x[0] - 16.5,)))
+    reset = staticmethod(nlctl.equation(lambda t, x, u, p: (17.0,)))
+
+
+@how
+@pytest.mark.parametrize("begin", [0.0, 100.0])
+def test_a_guard_that_begins_at_0_falls_at_once(how, begin):
+    """What the shortest steps add to a state of 16.5 is lost in rounding."""
+    room = nlctl.block(Room(), "room")
+    run = nlctl.input_output_response(room, [begin, begin + 0.2], **how)
+    falls = begin + np.log(7 / 6.5) * np.arange(3)
+    np.testing.assert_allclose(run.events["time"], falls, rtol=0, atol=1e-5)
+
+
+@nlctl.record
+class Bouncer:
+    """A ball that leaves the ground, which is at 16.5, as fast as it has come."""
+
+    inputs, outputs, states, feedthrough = (), ("h", "v"), ("h", "v"), False
+    initial = {"h": 16.5, "v": 1.0}
+    update = staticmethod(nlctl.equation(lambda t, x, u, p: (x[1], -1.0)))
+    output = staticmethod(nlctl.equation(lambda t, x, u, p: (x[0], x[1])))
+    guard = staticmethod(nlctl.equation(lambda t, x, u, p: (x[0] - 16.5,)))
+    reset = staticmethod(nlctl.equation(lambda t, x, u, p: (16.5, -x[1])))
+
+
+@how
+def test_a_guard_that_begins_at_0_may_rise_and_fall_later(how):
+    """The ball is back after 2 s each time."""
+    run = nlctl.input_output_response(nlctl.block(Bouncer(), "ball"), [0, 7], **how)
+    np.testing.assert_allclose(run.events["time"], [2, 4, 6], rtol=0, atol=1e-5)
+
+
 @how
 def test_a_condition_of_time_at_the_end_of_a_run_is_seen_from_before(how):
     """It is 1 in each first half of a second, also from t = 10 s on."""

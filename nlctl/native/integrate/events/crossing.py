@@ -29,6 +29,7 @@ _GROWS = 100.0  # an error that is small by chance
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
 _LEAP = 10.0  # times the fastest rate
+_SLIGHT = 1e-3  # of a tolerance
 _LEAST = 1e-12  # of the time: shorter steps are taken, by the explicit method, whatever stages see
 
 
@@ -44,7 +45,7 @@ def crossing(task, lane, w, j):
     inside = _is_behind(task, lane, w, j)
     beyond = 0.0 if inside else _beyond(task, lane, w, j)
     if beyond > 0.0:
-        return _shortened(lane, beyond)
+        return _shortened(task, lane, w, beyond, j)
     if not inside and lane.traces == 0:
         return NOTHING
     bad = inside or (task.fixed == 0.0 and _has_seen_a_jump(task, lane, w, j))
@@ -67,11 +68,12 @@ def _has_seen_a_jump(task, lane, w, j):
 
 
 @numba.njit(**INNER)
-def _shortened(lane, beyond):
+def _shortened(task, lane, w, beyond, j):
     """Propose a shorter step in the place of one with a stage behind a condition."""
     # The stiff method's stages may hold each other back there, however short it is: what is too
-    # short for that is tried again as a step across.
-    if not lane.step > _LEAST * max(abs(lane.t), lane.last):
+    # short for that, or moves no state to speak of, is tried again as a step across.
+    is_short = not lane.step > _LEAST * max(abs(lane.t), lane.last)
+    if is_short or (is_stiff(lane) and _is_slight(task, lane, w, j)):
         if not is_stiff(lane):
             return NOTHING
         shorten(lane, 1.0)
@@ -82,6 +84,16 @@ def _shortened(lane, beyond):
         left = min(left, max(0.2, 1.0 / (1.0 + beyond)))
     shorten(lane, left)
     return REFUSED
+
+
+@numba.njit(**INNER)
+def _is_slight(task, lane, w, j):
+    """Whether a step moves all states by a small part of their tolerances, at their rates now."""
+    for i in range(w.x.shape[0]):
+        tolerance = task.atol + task.rtol * abs(w.x[i, j])
+        if not lane.step * abs(w.k[0, i, j]) <= _SLIGHT * tolerance:
+            return False
+    return True
 
 
 @numba.njit(**INNER)
@@ -135,7 +147,7 @@ def _across(task, lane, w, j):
     if not np.isfinite(w.error[j]):
         return NOTHING
     if task.fixed == 0.0 and _costs_too_much(task, lane, w, j):
-        shorten(lane, 1.0)
+        shorten(lane, 0.5 if lane.stiff else 1.0)  # which is not to ask for this one again
         return REFUSED
     for i in range(task.rows.switching):
         if has_crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):

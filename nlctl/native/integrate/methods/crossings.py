@@ -95,15 +95,24 @@ def side_left_to(p, terms, row, j):
 
 
 @numba.njit(**INNER)
+def falls_at_once(task, w, i, j):
+    """Whether a guard begins at 0 and falls from there: no polynomial says how far behind it is."""
+    # `crossing` looks right behind the start then, as with other methods.
+    row, p = w.x.shape[0] + i, task.taylor.highest - 1
+    begins = i >= task.rows.guarded and w.events.g_start[i, j] == 0.0
+    return begins and side_left_to(p, w.taylor.terms, row, j) < 0.0
+
+
+@numba.njit(**INNER)
 def part_behind_root(p, h, terms, row, ends, rest, j):
     """Return right behind which part of a step h a polynomial is 0, by its values at both ends."""
     low, high = 0.0, 1.0
-    f_low, f_high = ends
+    (f_low, f_high), far = ends, ends[1]  # it may begin at 0
     for n in range(60):
         part = f_low / (f_low - f_high)
         middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
         f = value_and_slope(p, middle * h, terms, row, j)[0]
-        if opposite(f, -f_low):
+        if opposite(f, far):
             low, f_low = middle, f
         else:
             high, f_high = middle, f

@@ -200,6 +200,7 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
     """Try a step of Rodas5P in the only lane."""
     stiff, order = w.stiff, task.stiff.elimination
     n, lane, h = w.x.shape[0], lanes[0], lanes[0].step
+    w.hh[0] = h
     if lane.jacobian_at != lane.t:
         _jacobian(rhs, point, along, task, lanes, w)
         if (lane.stiff + 1) % TRIAL == 0:  # when the methods are compared

@@ -37,6 +37,7 @@ from .carried import (
 )
 from .crossings import (
     PLACES_LOOKED_AT,
+    falls_at_once,
     first_crossing,
     followed_part,
     is_at,
@@ -263,7 +264,7 @@ def _aim(task, lanes, w):
         if lane.tries == 0:
             lane.at_once = 0.0
         for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
-            if _meets(task, w, i, w.ahead.g[i, j], j):
+            if _meets(task, w, i, w.ahead.g[i, j], j) and not falls_at_once(task, w, i, j):
                 ends = w.events.g_start[i, j], w.ahead.g[i, j]
                 root = part_behind_root(
                     task.taylor.highest - 1, lane.step, w.taylor.terms, w.x.shape[0] + i, ends,
