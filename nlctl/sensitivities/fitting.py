@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from ..annotations import as_annotated
+from ..arguments import one_of
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
 from ..native import Compiled
@@ -19,7 +20,7 @@ from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..native.floats import with_floats
 from ..params import as_numbers, integer
-from ..responses.arguments import checked_params, with_aliases
+from ..responses.arguments import HOLDS, checked_params, with_aliases
 from .fitted import Fit, FittedExperiment
 from .measured import Measurement, Observations, check_tell, measurements, observations
 from .names import VariedQuantity, checked_names, parameters_and_states, varied_quantities
@@ -45,6 +46,7 @@ def fit(
     *,
     separate: Sequence[str] = (),
     sigma: Mapping[str, float] | float = 1.0,
+    hold: str = "foh",
     params: Mapping[str, Any] | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
@@ -85,6 +87,8 @@ def fit(
         states; in the result ``"plant.x1(0) in experiment 2"``.
     sigma : mapping or float, optional
         Standard deviation of the noise by signal, as far as known: only ratios matter.
+    hold : {"foh", "zoh"}, optional
+        What inputs are between these times, as in `nlctl.input_output_response`.
     params : mapping, optional
         Parameters that are overridden and not sought.
     rtol, atol : float, optional
@@ -145,7 +149,7 @@ def fit(
     check_tell(observed, list(parameters), len(sought.names))
     search = _Search(tuple(
         _Run(diagram=diagram, observed=one, names=tuple(parameters), places=places,
-             how={"rtol": rtol, "atol": atol})
+             how={"rtol": rtol, "atol": atol, "hold": one_of("fit", "hold", hold, HOLDS)})
         for one, places in zip(observed, sought.places, strict=True)
     ))  # fmt: skip
     for run in search.runs:

@@ -21,7 +21,7 @@ from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..native.spare import give_back
-from ..responses.arguments import input_array, state_array
+from ..responses.arguments import held, input_array, state_array
 from .beginning import Arrays, commits_at_start, evaluated_rows
 from .missing import missing
 from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
@@ -41,6 +41,7 @@ class RunWithDerivatives:
     params: Mapping[str, Any] | None
     of: Sequence[str] | None
     with_respect_to: Sequence[str]
+    hold: str
     settings: Settings
     audit: Any
 
@@ -54,29 +55,37 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
         )
     names = checked_names("with_respect_to", run.with_respect_to)
     compiled = with_floats(compiled, names)
+    u = input_array(compiled.system, run.inputs, run.times)
+    shown = 1  # of how many times each is one that was asked for
+    if run.hold == "zoh" and u.size:
+        (times, u), shown = held(run.times, u), 2
+        run = replace(run, times=times, inputs=u)
     p = compiled.parameter_vector(run.params)
     cut = compiled.equations_with(p).cut
     if cut and _alone(compiled, run).statistics.called:  # it takes more passes than are written out
         compiled = compiled.calling(cut)
     signals = observed_signals(compiled, run.of)
     quantities = varied_quantities(compiled, names)
-    u = input_array(compiled.system, run.inputs, run.times)
     x0 = state_array(compiled.system, run.initial_state)
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
     span = float(run.times[0]), float(run.times[-1])
-    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
+    rise = float(np.ptp(u, axis=1).max(initial=0.0))
+    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span, rise)
     start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
     reached = run_once(_course(differentiated, run, u), start, whole)
     reached = _at_its_end(reached, run.times.size, differentiated.outputs)
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
+    reached = _of_every(shown, reached)
     full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
     lacks = missing(differentiated, (compiled, full), reached, given, commits)
-    return _response(differentiated, (signals, quantities), (run.times, reached), scale, lacks)
+    return _response(
+        differentiated, (signals, quantities), (run.times[::shown], reached), scale, lacks
+    )
 
 
 def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
@@ -86,6 +95,12 @@ def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
     if reached.statistics.status is not Status.DIVERGED or not ended:
         return reached
     return replace(reached, statistics=replace(reached.statistics, status=Status.OK))
+
+
+def _of_every(shown: int, reached: Trajectory) -> Trajectory:
+    """Return a run at the first of so many of its times, the next such one, and so on."""
+    arrays = {name: getattr(reached, name) for name in ("time", "outputs", "states", "inputs")}
+    return replace(reached, **{name: array[..., ::shown] for name, array in arrays.items()})
 
 
 def _alone(compiled: Compiled, run: RunWithDerivatives) -> Any:

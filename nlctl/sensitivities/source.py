@@ -219,6 +219,16 @@ class EquationParts:
         outside = from_time(self.graph, time, lines, self._row_of_rate)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
+    def with_bounded_inputs(self, rate: Expr) -> Expr:
+        """Return a rate by inputs that rise in no time as if they took some for it."""
+        # What is next to a step of an input is not what lies ahead of one that goes on so.
+        graph, steepest, schedule = self.graph, self.setting("steepest"), self.extended.schedule
+        bounded = {}
+        for row in range(schedule.ninputs - schedule.rates, schedule.ninputs):
+            most = graph.op("minimum", graph.leaf("u", row, None), steepest)
+            bounded[row] = graph.op("maximum", most, graph.op("neg", steepest))
+        return replaced_parts(graph, [rate], self.leaves([rate], bounded, "u"))[0]
+
     def _row_of_rate(self, row: int) -> int | None:
         """Return which row of the inputs has the rate of another, None if none has."""
         extended_program = self.extended
