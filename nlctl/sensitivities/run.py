@@ -29,6 +29,8 @@ from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 from .schedule import Sent
 
+_STEP, _PART = 1e-9, 1e-4  # how long steps of held inputs take: of the run, and of an interval
+
 
 @dataclass(frozen=True, kw_only=True)
 class RunWithDerivatives:
@@ -58,7 +60,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     u = input_array(compiled.system, run.inputs, run.times)
     shown = 1  # of how many times each is one that was asked for
     if run.hold == "zoh" and u.size:
-        (times, u), shown = held(run.times, u), 2
+        (times, u), shown = _steps(run.times, u), 2
         run = replace(run, times=times, inputs=u)
     p = compiled.parameter_vector(run.params)
     cut = compiled.equations_with(p).cut
@@ -79,7 +81,10 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
-    reached = _of_every(shown, reached)
+    if shown > 1:
+        reached = _of_every(shown, reached)
+        arrays = {"t": reached.time[None], "x": reached.states, "u": reached.inputs}
+        differentiated.sides.source.check_steps({**arrays, "p": whole[:, None]})
     full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
     lacks = missing(differentiated, (compiled, full), reached, given, commits)
@@ -95,6 +100,12 @@ def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
     if reached.statistics.status is not Status.DIVERGED or not ended:
         return reached
     return replace(reached, statistics=replace(reached.statistics, status=Status.OK))
+
+
+def _steps(times: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return held inputs with steps that take long enough for events to be located in them."""
+    over = np.minimum(_STEP * np.ptp(times), _PART * np.diff(times))
+    return held(times, u, over)
 
 
 def _of_every(shown: int, reached: Trajectory) -> Trajectory:

@@ -254,9 +254,10 @@ def _between(problem: TuningProblem, best: np.ndarray, seen: Worth) -> Iterator[
     rows = [(m.key, _by_key(problem, seen)[m.key], lower[m.key]) for m in problem.margins]
     for key, margin, below in rows:
         if below < margin - _BETWEEN * (1.0 + abs(margin)):
+            samples = counted(denser.times.size, "sample")
             yield (
-                f"the margin of '{key}' is {below:.4g} with {counted(denser.times.size, 'sample')}, not "
-                f"{margin:.4g}: give more timepts than {problem.times.size}"
+                f"the margin of '{key}' is {below:.4g} with {samples}, not {margin:.4g}: give "
+                f"more timepts than {problem.times.size}"
             )
 
 
