@@ -363,11 +363,11 @@ class _Maker:
             guards.setdefault(i, []).append(guard)
         for (i, begin, _), (_, array) in zip(source.program.jumping, resets, strict=True):
             pieces += self.saltation.at_reset(begin, array.pieces(), guards[i])
-        at_conditions = self.saltation.at_conditions() if self.sides.watches else []
-        pieces += at_conditions
+        if self.sides.watches:
+            pieces += self.saltation.at_conditions()
         reversed_levels = self.saltation.at_turns()
         if reversed_levels:
-            pieces += self._turned_or_across(reversed_levels, at_conditions)
+            pieces += [(e, 1) for e in reversed_levels.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
             pieces += [(e, 1) for e in self.ends.at_turns]
         if self.saltation.turning or self.ends.guards:
@@ -376,20 +376,6 @@ class _Maker:
         if places.lines:
             pieces += self.saltation.at_arrival()
         return self._rows(0, pieces)
-
-    def _turned_or_across(
-        self, turned: dict[int, Expr], at_conditions: Sequence[SomeRows]
-    ) -> list[SomeRows]:
-        """Return what derivatives of memories become where these turn, or something jumps too."""
-        if not at_conditions:
-            return [(e, 1) for e in turned.values()]
-        graph = self.source.graph
-        left = graph.op("lt", self.sides.margin, graph.const(0.0))
-        jumped, first = graph.joined(list(at_conditions)), self.places.states
-        return [
-            (graph.op("select", left, graph.item(jumped, row - first), e), 1)
-            for row, e in turned.items()
-        ]
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:
         graph, count = self.source.graph, len(self.source.program.sampled)
