@@ -82,9 +82,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
     if shown > 1:
-        reached = _of_every(shown, reached)
-        arrays = {"t": reached.time[None], "x": reached.states, "u": reached.inputs}
-        differentiated.sides.source.check_steps({**arrays, "p": whole[:, None]})
+        reached = _shown(shown, reached, differentiated, whole)
     full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
     lacks = missing(differentiated, (compiled, full), reached, given, commits)
@@ -108,10 +106,15 @@ def _steps(times: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return held(times, u, over)
 
 
-def _of_every(shown: int, reached: Trajectory) -> Trajectory:
-    """Return a run at the first of so many of its times, the next such one, and so on."""
+def _shown(
+    shown: int, reached: Trajectory, differentiated: Differentiated, p: np.ndarray
+) -> Trajectory:
+    """Return a run with held inputs, which nothing sees step, at the times that were asked for."""
     arrays = {name: getattr(reached, name) for name in ("time", "outputs", "states", "inputs")}
-    return replace(reached, **{name: array[..., ::shown] for name, array in arrays.items()})
+    reached = replace(reached, **{name: rows[..., ::shown] for name, rows in arrays.items()})
+    arrays = {"t": reached.time[None], "x": reached.states, "u": reached.inputs, "p": p[:, None]}
+    differentiated.sides.source.check_steps(arrays)
+    return reached
 
 
 def _alone(compiled: Compiled, run: RunWithDerivatives) -> Any:
