@@ -225,7 +225,7 @@ class EquationParts:
 
     def with_bounded_inputs(self, rate: Expr) -> Expr:
         """Return a rate by inputs that rise in no time as if they took some for it."""
-        # What is next to a step of an input is not what lies ahead of one that goes on so.
+        # A step of an input ends at once: what lies ahead of it is not reached at its slope.
         graph, steepest, schedule = self.graph, self.setting("steepest"), self.extended.schedule
         bounded = {}
         for row in range(schedule.ninputs - schedule.rates, schedule.ninputs):
