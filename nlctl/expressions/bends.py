@@ -147,6 +147,7 @@ def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
     arrays = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
     size = np.where((p == 0.0) | ~np.isfinite(p), 1.0, np.abs(p))[:, None]
     arrays["p"] = p[:, None] + _NEAR * size * rng.normal(size=(p.size, _POINTS))
+    arrays["p"][:, ::2] = p[:, None]  # what asks whether one is 0 has another answer next to it
     return arrays
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import linecache
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
 
 from .arrays import leaf_vector
+from .bends import replaced_parts
 from .derivatives import tangents
 from .functions import FUNCTIONS
 from .graph import (
@@ -26,13 +28,15 @@ from .graph import (
 )
 from .trace import trace
 
+_NEXT_TO = 1e-7  # of numbers of size 1: what is right next to them
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 
 
 def jacobian_function(function: Callable, n: int, *others: int) -> Callable:
     """Make the Jacobian of ``function(x, ...)`` by x, of n numbers; others have these sizes."""
-    # It takes the same arguments and returns an array of shape (results, n). What cannot be read,
-    # or has no derivative, is `Untraceable`.
+    # It takes the same arguments and returns an array of shape (results, n), where numbers that are
+    # compared are equal that right next to it. What cannot be read, or has no derivative, is
+    # `Untraceable`.
     graph, names = Graph(), "abcdefgh"[: 1 + len(others)]
 
     def arguments() -> tuple[Any, ...]:
@@ -44,6 +48,7 @@ def jacobian_function(function: Callable, n: int, *others: int) -> Callable:
     with np.errstate(all="ignore"):
         results = [e for e, _ in trace(graph, function, arguments).pieces()]
     columns = [tangents(graph, results, _unit(graph, j)) for j in range(n)]
+    columns = [_next_to_equals(graph, results, column) for column in columns]
     rows = [[column[i] for column in columns] for i in range(len(results))]
     return _compiled(_source(rows, names))
 
@@ -51,6 +56,29 @@ def jacobian_function(function: Callable, n: int, *others: int) -> Callable:
 def _unit(graph: Graph, j: int) -> Callable[[Expr], Expr | None]:
     """Return the derivative of what is read by element j of the first argument."""
     return lambda leaf: graph.const(1.0) if leaf.data[:2] == ("a", j) else None
+
+
+def _next_to_equals(
+    graph: Graph, results: Sequence[Expr], slopes: Sequence[Expr | None]
+) -> list[Expr | None]:
+    """Return derivatives right next to points that have an expression of their own."""
+    # ``v * (1 - abs(v)) if v != 0 else 0.0`` has the slope 1 at v = 0, and the second way has 0.
+    x = [e for e in needed(results) if e.op == "leaf" and e.data[0] == "a"]
+    asked = [
+        e for e in needed(results) if e.op in ("eq", "ne") and not set(x).isdisjoint(needed([e]))
+    ]
+    met = [e if e.op == "eq" else graph.op("not", e) for e in asked]
+    if not met:
+        return list(slopes)
+    equal, little = reduce(partial(graph.op, "or"), met), graph.const(_NEXT_TO)
+    moved = {}
+    for k, leaf in enumerate(x):  # in a direction of no zero and no two equal numbers
+        size = graph.op("add", graph.op("absolute", leaf), graph.const(1.0 + 0.1 * k))
+        beside = graph.op("add", leaf, graph.op("mul", little, size))
+        moved[leaf] = graph.op("select", equal, beside, leaf)
+    given = [e for e in slopes if e is not None]
+    changed = iter(replaced_parts(graph, given, moved))
+    return [None if e is None else next(changed) for e in slopes]
 
 
 def _source(rows: list[list[Expr | None]], names: str) -> str:

@@ -242,7 +242,6 @@ class Compiled(Reading, StandIn):
             x0, u0 = x0.states, x0.inputs if u0 is None else u0
         system = self.system
         n = system.nstates or 0
-        jacobians.tell_of_differences(self, self.parameter_vector(params))
         derivatives = audited_jacobian(self, x0, u0, t, params)
         rates, outputs, dt = derivatives["dx"], derivatives["y"], system.dt
         if self.program.sampled:
@@ -285,7 +284,6 @@ class Compiled(Reading, StandIn):
         """
         reading = floats.with_floats(self, parameters)
         places = floats.float_parameters(reading)
-        jacobians.tell_of_differences(self, self.parameter_vector(params))  # blocks have these
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))
         for k, name in enumerate(map(in_one_spelling, parameters)):

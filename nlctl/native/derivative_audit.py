@@ -12,7 +12,6 @@ derivative, and differences are taken, which is said.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -20,13 +19,13 @@ import numpy as np
 
 from ..diagrams import supplied_blocks
 from ..diagrams.points import rates_and_outputs
-from ..errors import AuditError, InexactWarning
+from ..errors import AuditError
 from ..expressions.staircases import contradicted
 from ..responses.arguments import state_array
 from ..sampling.system import happening
 from ..upstream.systems import System
 from .diagram.parameters import length
-from .jacobians import inexact, jacobian, point_numbers
+from .jacobians import inexact, jacobian, point_numbers, tell_of, tell_of_differences
 from .reading import Reading
 
 _STEPS = 10.0 ** -np.array([4, 7, 10])  # relative to what is moved; absolute where that is 0
@@ -41,14 +40,14 @@ def audited_jacobian(
     reading: Reading, x0: object, u0: object, t: float, params: Mapping[str, Any] | None
 ) -> dict[str, np.ndarray]:
     """Return derivatives by states and inputs that differences do not contradict."""
-    system = reading.system
+    system, p = reading.system, reading.parameter_vector(params)
     n, m, given = system.nstates or 0, system.ninputs or 0, reading.schedule.ninputs
     directions = np.eye(n + given + length(reading.program.layout), n + m)
     point = np.append(state_array(system, x0), point_numbers("u0 needs", m, f"'{system.name}'", u0))
     values = rates_and_outputs(system, params)
     return _audited(
-        reading, params, point, [*system.state_labels, *system.input_labels],
-        lambda near: jacobian(reading, near[:n], near[n:], t, params, directions),
+        reading, p, point, [*system.state_labels, *system.input_labels],
+        lambda near: jacobian(reading, near[:n], near[n:], t, p, directions),
         lambda near: values(t, near[:n], near[n:]),
     )  # fmt: skip
 
@@ -62,25 +61,29 @@ def audited_by_parameters(
     x = state_array(system, x0)
     u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
     start = directions.shape[0] - length(reading.program.layout)
+    p = reading.parameter_vector(params)
 
     def with_values(now: np.ndarray) -> dict[str, Any]:
         return {**(params or {}), **dict(zip(names, now.tolist(), strict=True))}
 
     return _audited(
-        reading, params, reading.parameter_vector(params) @ directions[start:], names,
-        lambda near: jacobian(reading, x, u, t, with_values(near), directions),
+        reading, p, p @ directions[start:], names,
+        lambda near: jacobian(
+            reading, x, u, t, reading.parameter_vector(with_values(near)), directions
+        ),
         lambda near: rates_and_outputs(system, with_values(near))(t, x, u),
     )  # fmt: skip
 
 
 def _audited(
-    reading: Reading, params: Mapping[str, Any] | None, point: np.ndarray, by: Sequence[str],
+    reading: Reading, p: np.ndarray, point: np.ndarray, by: Sequence[str],
     derivatives: Callable[[np.ndarray], dict[str, np.ndarray]],
     values: Callable[[np.ndarray], tuple[np.ndarray, ...]],
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Return derivatives at a point by what its coordinates are."""
-    system, found = reading.system, derivatives(point)
-    equations = reading.equations_with(reading.parameter_vector(params))
+    system, equations = reading.system, reading.equations_with(p)
+    tell_of_differences(reading, p)
+    found = derivatives(point)
     if not point.size or supplied_blocks(system) or inexact(equations, ("dx", "y")):
         return found
     count = (system.nstates or 0) + (system.noutputs or 0)
@@ -95,7 +98,8 @@ def _audited(
     words = derivatives_in_words(system, by)
     both = at, lambda near: _matrix(derivatives(near))
     matrix, said = checked_derivatives(words, _matrix(found), both, point)
-    tell_of(said, 6)
+    for sentence in said:
+        tell_of(sentence)
     return found | dict(zip(("dx", "y"), np.split(matrix, [system.nstates or 0]), strict=True))
 
 
@@ -112,12 +116,6 @@ def derivatives_in_words(
     of += [f"output '{y}'" for y in system.output_labels or ()]
     of += [f"what enters '{line}'" for line in lines]
     return [[f"the derivative of {a} of '{system.name}' by '{b}'" for b in by] for a in of]
-
-
-def tell_of(said: Sequence[str], stacklevel: int) -> None:
-    """Warn of derivatives that are differences."""
-    for sentence in said:
-        warnings.warn(sentence, InexactWarning, stacklevel)
 
 
 def checked_derivatives(

@@ -16,8 +16,7 @@ from ..responses.arguments import checked_params, state_array
 from ..upstream.systems import System
 from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram, Derivatives
-from .derivative_audit import tell_of
-from .jacobians import tell_of_differences
+from .jacobians import tell_of, tell_of_differences
 
 _WHO = "frequency_response"
 _POINTS = 1000  # of frequencies that nobody has given
@@ -113,7 +112,8 @@ def _around(cut: CutDiagram, at: object, inputs: object) -> Derivatives:
     x = state_array(cut.compiled.system, at)
     u = cut.inputs(_WHO, "inputs", inputs)
     derivatives, said = cut.checked(x, u, cut.leaving(x, u))
-    tell_of(said, 5)
+    for sentence in said:
+        tell_of(sentence)
     tell_of_differences(cut.compiled, cut.p)
     return derivatives
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -32,6 +33,7 @@ from .lower import DIRECTION
 from .reading import Reading
 
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
+_INSIDE = ("nlctl", "control")  # whose lines are not the caller's
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 
@@ -123,12 +125,12 @@ def jacobian(
     x0: object,
     u0: object,
     t: float,
-    params: Mapping[str, Any] | None,
+    p: np.ndarray,
     directions: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Return the derivatives of the right-hand side and of the outputs along directions."""
     # Shapes: `directions` (nstates + inputs of the program + parameters, k).
-    system, t, p = reading.system, number("linearize", "t", t), reading.parameter_vector(params)
+    system, t = reading.system, number("linearize", "t", t)
     made = tangent(reading, p)
     u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
     u = np.append(u, np.zeros(reading.schedule.rates))  # they stand still
@@ -137,7 +139,7 @@ def jacobian(
     if cut and any(np.isnan(part).any() for part in found.values()):
         calling = reading.calling(cut)  # a loop takes more passes there than are written out
         tell_of_differences(calling, p)
-        return jacobian(calling, x0, u0, t, params, directions)
+        return jacobian(calling, x0, u0, t, p, directions)
     return found
 
 
@@ -185,12 +187,16 @@ def tell_of_differences(reading: Reading, p: np.ndarray) -> None:
     names = ("dx", "y", *(r for r in found.results if r.startswith("sample")))
     why = inexact(found, names)
     if why is not None:
-        warnings.warn(
-            f"derivatives of '{reading.system.name}' are differences where {why}, and exact "
-            "elsewhere",
-            InexactWarning,
-            stacklevel=4,
-        )
+        tell_of(f"derivatives of '{reading.system.name}' are differences where {why}, and exact "
+                "elsewhere")  # fmt: skip
+
+
+def tell_of(sentence: str) -> None:
+    """Warn of derivatives that are differences, at the line that has asked for them."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in _INSIDE:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(sentence, InexactWarning, level)
 
 
 def over_a_period(reading: Reading, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:

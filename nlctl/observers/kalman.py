@@ -41,8 +41,9 @@ class ExtendedKalmanFilter:
         F = df/dx (x_hat, u),   H = dh/dx (x_hat)
 
     with Q and R the intensities of white noise w and v.  F and H are exact derivatives, derived
-    once from the expressions that f and h compute.  Of a linear plant it is the Kalman-Bucy filter,
-    and P tends to what `control.lqe` finds.  In discrete time it is
+    once from the expressions that f and h compute; where these ask whether numbers are equal that
+    are, the derivatives are those right next to there.  Of a linear plant it is the Kalman-Bucy
+    filter, and P tends to what `control.lqe` finds.  In discrete time it is
     ``nlctl.sampled(nlctl.discretise(nlctl.block(filter, name), dt))``.
 
     Parameters

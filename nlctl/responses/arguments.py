@@ -193,11 +193,16 @@ def evaluation_array(evaluation_times: object, times: np.ndarray) -> np.ndarray:
     return evaluation
 
 
-def held(times: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return 2 m - 1 times and inputs, linear in between, that step at each of m times."""
+def held(
+    times: np.ndarray, inputs: np.ndarray, over: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return 2 m - 1 times and inputs, linear in between, that step at each of m times.
+
+    Each step takes as long as `over` says (s), or to the next float.
+    """
     # The value before lasts until the float before the time: no run has an instant between the two.
     steps, u = np.empty(2 * times.size - 1), np.repeat(inputs, 2, axis=1)
-    steps[::2], steps[1::2] = times, np.nextafter(times[1:], -np.inf)
+    steps[::2], steps[1::2] = times, np.minimum(np.nextafter(times[1:], -np.inf), times[1:] - over)
     return steps, np.ascontiguousarray(u[:, :-1])
 
 

@@ -43,7 +43,8 @@ def corners_of(
         (rate,) = source.slopes([level], source.time(source.flow, delays_move=False))
         if rate is None:
             continue
-        little = graph.op("mul", graph.op("mul", graph.const(_BETWEEN), longest), rate)
+        little = graph.op("mul", graph.const(_BETWEEN), longest)
+        little = graph.op("mul", little, source.with_bounded_inputs(rate))
         was, is_then = (
             graph.op("gt", graph.op(op, level, little), graph.const(0.0)) for op in ("sub", "add")
         )

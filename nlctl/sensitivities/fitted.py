@@ -59,6 +59,7 @@ class Fit:
     experiments: tuple[FittedExperiment, ...]  # In the order of the data, one at least.
     success: bool  # Whether the search has converged.
     message: str  # How it ended.
+    notes: tuple[str, ...] = ()  # What had to be done otherwise, a sentence each.
 
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
@@ -135,4 +136,4 @@ class Fit:
         ]
         if not self.success:
             lines.append(f"  the search has not converged: {self.message}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])

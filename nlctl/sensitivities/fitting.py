@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from ..annotations import as_annotated
+from ..arguments import one_of
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
 from ..native import Compiled
@@ -19,7 +20,7 @@ from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..native.floats import with_floats
 from ..params import as_numbers, integer
-from ..responses.arguments import checked_params, with_aliases
+from ..responses.arguments import HOLDS, checked_params, with_aliases
 from .fitted import Fit, FittedExperiment
 from .measured import Measurement, Observations, check_tell, measurements, observations
 from .names import VariedQuantity, checked_names, parameters_and_states, varied_quantities
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 _UNKNOWN = 1e-9  # of the largest singular value: a direction in which data say nothing
 _SHARE = 0.1  # of such a direction: parameters with less are not in it
+_NEXT_TO = 1e-5  # of a parameter: how far differences go, where there is no derivative
 _LOST = 1e6  # noises: what a run that does not reach its end is wrong by
 
 
@@ -45,6 +47,7 @@ def fit(
     *,
     separate: Sequence[str] = (),
     sigma: Mapping[str, float] | float = 1.0,
+    hold: str = "foh",
     params: Mapping[str, Any] | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
@@ -54,9 +57,10 @@ def fit(
     """Find parameters and initial states with which a run fits data.
 
     Nonlinear least squares (`scipy.optimize.least_squares`) with the derivatives of runs, so that
-    dead zones, backlash, relays and samples are no hindrance.  How sure the values are follows
-    from the Fisher matrix at the end: residuals are taken to be independent and equally large in
-    units of `sigma`.  Of several experiments the residuals and the Fisher matrices add up.
+    dead zones, backlash, relays and samples are no hindrance; where a run has none, differences of
+    runs to the side that fits better take their place, and a note says so.  How sure the values are
+    follows from the Fisher matrix at the end: residuals are taken to be independent and equally
+    large in units of `sigma`.  Of several experiments the residuals and the Fisher matrices add up.
 
     Parameters
     ----------
@@ -85,6 +89,8 @@ def fit(
         states; in the result ``"plant.x1(0) in experiment 2"``.
     sigma : mapping or float, optional
         Standard deviation of the noise by signal, as far as known: only ratios matter.
+    hold : {"foh", "zoh"}, optional
+        What inputs are between these times, as in `nlctl.input_output_response`.
     params : mapping, optional
         Parameters that are overridden and not sought.
     rtol, atol : float, optional
@@ -143,15 +149,16 @@ def fit(
     observed = observations(measured, diagram.system)
     sought = _sought(diagram, parameters, separate, [one.name for one in observed])
     check_tell(observed, list(parameters), len(sought.names))
+    how = {"rtol": rtol, "atol": atol, "hold": one_of("fit", "hold", hold, HOLDS)}
     search = _Search(tuple(
-        _Run(diagram=diagram, observed=one, names=tuple(parameters), places=places,
-             how={"rtol": rtol, "atol": atol})
+        _Run(diagram=diagram, observed=one, names=tuple(parameters), places=places, how=how,
+             low=sought.low, high=sought.high, instead={})
         for one, places in zip(observed, sought.places, strict=True)
     ))  # fmt: skip
     for run in search.runs:
         with run.observed.naming():
             run.response(sought.start)
-    derivatives: Any = search.jacobian  # SciPy takes functions as well as texts
+    derivatives: Any = search.slopes  # SciPy takes functions as well as texts
     optimum = least_squares(
         search.residuals, sought.start, derivatives, (sought.low, sought.high),
         x_scale=_scale(sought.start), xtol=1e-12, ftol=1e-12, gtol=1e-12,
@@ -171,7 +178,7 @@ def _fit_of(search: _Search, optimum: Any, names: tuple[str, ...]) -> Fit:
         unidentifiable=tuple(n for n, u in zip(names, unseen, strict=True) if u),
         at_bounds=tuple(n for n, at in zip(names, optimum.active_mask, strict=True) if at),
         noise=noise, freedom=freedom, success=bool(optimum.status > 0),
-        message=str(optimum.message),
+        message=str(optimum.message), notes=search.notes,
         experiments=tuple(run.fitted(optimum.x) for run in search.runs),
     )  # fmt: skip
 
@@ -205,6 +212,9 @@ class _Run:
     names: tuple[str, ...]
     places: np.ndarray  # where these are among all numbers that are sought
     how: Mapping[str, Any]
+    low: np.ndarray  # of all numbers that are sought
+    high: np.ndarray
+    instead: dict[str, None]  # why differences took the place of derivatives
     _at: bytes = b""
     _last: SensitivityResponse | None = None
 
@@ -249,12 +259,35 @@ class _Run:
         rows[:, self.places] = np.nan_to_num(np.moveaxis(derivatives, 1, 2)[self._has_datum])
         return rows
 
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Return the same; where there are none, differences to the side that fits better."""
+        rows, here, lacks = self.jacobian(x), self.residuals(x), self.response(x).missing
+        for name in (name for lack in lacks for name in lack.with_respect_to):
+            k = self.places[self.names.index(name)]
+            step = _NEXT_TO * _scale(x)[k]
+            self.instead |= {lack.why: None for lack in lacks}
+            for side in (step, -step):
+                moved = x.copy()
+                moved[k] += side
+                if not self.low[k] <= moved[k] <= self.high[k]:
+                    continue
+                rows[:, k] = (self.residuals(moved) - here) / side
+                if side * (here @ rows[:, k]) < 0.0:  # the squares fall
+                    break
+        return rows
+
 
 @dataclass(frozen=True, eq=False)
 class _Search:
     """All experiments."""
 
     runs: tuple[_Run, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done otherwise than asked, in words."""
+        whys = dict.fromkeys(why for run in self.runs for why in run.instead)
+        return tuple(f"differences of runs took the place of derivatives: {why}" for why in whys)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Return the residuals of all, one experiment behind the other."""
@@ -263,6 +296,10 @@ class _Search:
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Return their derivatives."""
         return np.vstack([run.jacobian(x) for run in self.runs])
+
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Return the same, differences where there are none."""
+        return np.vstack([run.slopes(x) for run in self.runs])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

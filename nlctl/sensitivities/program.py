@@ -32,6 +32,7 @@ from .source import EquationParts, equation_parts
 # or as the part over which it is seen whether a memory turns.
 _LATE, _AHEAD = 0.5, 1e-4
 _MOVED = 1e3  # times what is known of a number: by less it is not moved
+_RISE = 1e-3  # of what inputs go through: by more they do not rise where a step ends behind a turn
 _PASSED = 1e-14  # of the times: break points of t that are as close are passed together
 
 
@@ -57,6 +58,7 @@ def parameters_with(
     scale: np.ndarray,
     settings: Settings,
     span: tuple[float, float],
+    rise: float = 1.0,
 ) -> np.ndarray:
     """Return all parameters of a program with derivatives."""
     size = extended_program.slot("rounding").offset + 1
@@ -73,7 +75,7 @@ def parameters_with(
                 whole[slots["before"].offset] = scale[j]
     given = {
         "scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late,
-        "rounding": rounding,
+        "steepest": _RISE * rise / late, "rounding": rounding,
     }  # fmt: skip
     for name, value in given.items():
         slot = extended_program.slot(name)

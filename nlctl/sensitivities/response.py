@@ -9,12 +9,12 @@ import control as ct
 from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
-from ..arguments import tolerances
+from ..arguments import one_of, tolerances
 from ..native import Compiled, Tableau, compile  # noqa: A004 (what it does)
 from ..native.diagram.checks import sized
 from ..native.settings import solver_settings
 from ..params import checked_times
-from ..responses.arguments import checked_params, with_aliases
+from ..responses.arguments import HOLDS, checked_params, with_aliases
 from .record import SensitivityResponse
 from .run import RunWithDerivatives, differentiated_run
 
@@ -28,6 +28,7 @@ def sensitivity_response(
     *,
     with_respect_to: Sequence[str] | str,
     of: Sequence[str] | str | None = None,
+    hold: str = "foh",
     params: Mapping[str, Any] | None = None,
     method: str | Tableau | None = None,
     rtol: float = 1e-8,
@@ -60,6 +61,8 @@ def sensitivity_response(
     of : sequence of str or str, optional
         Outputs of the diagram, outputs of its blocks, ``"plant.y"``, and states; by default the
         outputs of the diagram.
+    hold : {"foh", "zoh"}, optional
+        What inputs are between `timepts`, as in `nlctl.input_output_response`: linear, or held.
     params : mapping, optional
         Overrides by qualified name.
     method : str or Tableau, optional
@@ -127,6 +130,7 @@ def sensitivity_response(
     named = with_aliases(named, aliases, sensitivity_response)
     checked_params(params)
     tolerances("sensitivity_response", rtol, atol)
+    one_of("sensitivity_response", "hold", hold, HOLDS)
     settings = solver_settings(
         method=method, solve_ivp_method=None, solve_ivp_kwargs=None, rtol=rtol, atol=atol,
         max_steps=max_steps, max_step=max_step,
@@ -134,7 +138,7 @@ def sensitivity_response(
     run = RunWithDerivatives(
         times=checked_times(named["timepts"]), inputs=named["inputs"],
         initial_state=named["initial_state"], params=params, of=of,
-        with_respect_to=with_respect_to, settings=settings, audit=audit,
+        with_respect_to=with_respect_to, hold=hold, settings=settings, audit=audit,
     )  # fmt: skip
     if not isinstance(diagram, Compiled):
         diagram = compile(sized(diagram, run.times, run.inputs, run.initial_state), params=params)

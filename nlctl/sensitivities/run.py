@@ -21,13 +21,15 @@ from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..native.spare import give_back
-from ..responses.arguments import input_array, state_array
+from ..responses.arguments import held, input_array, state_array
 from .beginning import Arrays, commits_at_start, evaluated_rows
 from .missing import missing
 from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 from .schedule import Sent
+
+_STEP, _PART = 1e-9, 1e-4  # how long steps of held inputs take: of the run, and of an interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +43,7 @@ class RunWithDerivatives:
     params: Mapping[str, Any] | None
     of: Sequence[str] | None
     with_respect_to: Sequence[str]
+    hold: str
     settings: Settings
     audit: Any
 
@@ -54,29 +57,38 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
         )
     names = checked_names("with_respect_to", run.with_respect_to)
     compiled = with_floats(compiled, names)
+    u = input_array(compiled.system, run.inputs, run.times)
+    shown = 1  # of how many times each is one that was asked for
+    if run.hold == "zoh" and u.size:
+        (times, u), shown = _steps(run.times, u), 2
+        run = replace(run, times=times, inputs=u)
     p = compiled.parameter_vector(run.params)
     cut = compiled.equations_with(p).cut
     if cut and _alone(compiled, run).statistics.called:  # it takes more passes than are written out
         compiled = compiled.calling(cut)
     signals = observed_signals(compiled, run.of)
     quantities = varied_quantities(compiled, names)
-    u = input_array(compiled.system, run.inputs, run.times)
     x0 = state_array(compiled.system, run.initial_state)
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
     span = float(run.times[0]), float(run.times[-1])
-    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
+    rise = float(np.ptp(u, axis=1).max(initial=0.0))
+    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span, rise)
     start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
     reached = run_once(_course(differentiated, run, u), start, whole)
     reached = _at_its_end(reached, run.times.size, differentiated.outputs)
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
+    if shown > 1:
+        reached = _shown(shown, reached, differentiated, whole)
     full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
     lacks = missing(differentiated, (compiled, full), reached, given, commits)
-    return _response(differentiated, (signals, quantities), (run.times, reached), scale, lacks)
+    return _response(
+        differentiated, (signals, quantities), (run.times[::shown], reached), scale, lacks
+    )
 
 
 def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
@@ -86,6 +98,23 @@ def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
     if reached.statistics.status is not Status.DIVERGED or not ended:
         return reached
     return replace(reached, statistics=replace(reached.statistics, status=Status.OK))
+
+
+def _steps(times: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return held inputs with steps that take long enough for events to be located in them."""
+    over = np.minimum(_STEP * np.ptp(times), _PART * np.diff(times))
+    return held(times, u, over)
+
+
+def _shown(
+    shown: int, reached: Trajectory, differentiated: Differentiated, p: np.ndarray
+) -> Trajectory:
+    """Return a run with held inputs, which nothing sees step, at the times that were asked for."""
+    arrays = {name: getattr(reached, name) for name in ("time", "outputs", "states", "inputs")}
+    reached = replace(reached, **{name: rows[..., ::shown] for name, rows in arrays.items()})
+    arrays = {"t": reached.time[None], "x": reached.states, "u": reached.inputs, "p": p[:, None]}
+    differentiated.sides.source.check_steps(arrays)
+    return reached
 
 
 def _alone(compiled: Compiled, run: RunWithDerivatives) -> Any:

@@ -184,7 +184,8 @@ def _layout(compiled: Compiled, delays: int, by: int) -> dict[int, dict[str, Slo
         "rtol": Slot(name="rtol", offset=at + by, shape=(), kind="f"),
         "atol": Slot(name="atol", offset=at + by + 1, shape=(), kind="f"),
         "late": Slot(name="late", offset=at + by + 2, shape=(), kind="f"),
-        "rounding": Slot(name="rounding", offset=at + by + 3, shape=(), kind="f"),
+        "steepest": Slot(name="steepest", offset=at + by + 3, shape=(), kind="f"),
+        "rounding": Slot(name="rounding", offset=at + by + 4, shape=(), kind="f"),
     }
     layout |= {count + delays + k: {} for k in range(1, _OWNERS)}
     for k in range(len(compiled.schedule.samplings)):

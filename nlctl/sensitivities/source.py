@@ -22,6 +22,7 @@ from ..expressions.bends import only_bends, replaced_parts
 from ..expressions.conditions import conditions, switching_function
 from ..expressions.continuity import may_jump
 from ..expressions.dependence import reads, rows_read
+from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
 from ..native import Compiled
@@ -30,6 +31,7 @@ from ..native.diagram.parameters import slots_of
 from ..native.diagram.program import Program, count_switching_functions, memory
 from ..native.diagram.trace import traced_arguments
 from ..native.equations.blocks import Equations, equations
+from ..native.jacobians import searches_of
 from ..sliding.relay import SLIDING
 from .branches import by_comparisons, jumping
 from .directions import Direction, SomeRows, from_time, one_sided, rows_replaced, slopes, taken
@@ -103,10 +105,7 @@ class EquationParts:
 
     def _is_caught(self, expr: Expr) -> bool:
         """Return whether what a memory becomes moves with anything but memories."""
-        graph, memories = self.graph, self.program.memory
-
-        def of(start: int, step: int, size: int | None) -> Expr | None:
-            return graph.joined([(graph.const(1.0), 1)] * size) if size else graph.const(1.0)
+        graph, memories, of = self.graph, self.program.memory, self._everywhere
 
         def of_states(start: int, step: int, size: int | None) -> Expr | None:
             rows = [start + step * i for i in range(size or 1)]
@@ -115,6 +114,11 @@ class EquationParts:
 
         every = Direction(of={"t": of, "u": of, "p": of, "x": of_states})
         return self.slopes([expr], every)[0] is not None
+
+    def _everywhere(self, start: int, step: int, size: int | None) -> Expr:
+        """Return a direction in which all numbers go."""
+        one = self.graph.const(1.0)
+        return self.graph.joined([(one, 1)] * size) if size else one
 
     @cached_property
     def flow(self) -> list[SomeRows]:
@@ -219,6 +223,16 @@ class EquationParts:
         outside = from_time(self.graph, time, lines, self._row_of_rate)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
+    def with_bounded_inputs(self, rate: Expr) -> Expr:
+        """Return a rate by inputs that rise in no time as if they took some for it."""
+        # A step of an input ends at once: what lies ahead of it is not reached at its slope.
+        graph, steepest, schedule = self.graph, self.setting("steepest"), self.extended.schedule
+        bounded = {}
+        for row in range(schedule.ninputs - schedule.rates, schedule.ninputs):
+            most = graph.op("minimum", graph.leaf("u", row, None), steepest)
+            bounded[row] = graph.op("maximum", most, graph.op("neg", steepest))
+        return replaced_parts(graph, [rate], self.leaves([rate], bounded, "u"))[0]
+
     def _row_of_rate(self, row: int) -> int | None:
         """Return which row of the inputs has the rate of another, None if none has."""
         extended_program = self.extended
@@ -275,6 +289,24 @@ class EquationParts:
                 "of runs"
             )
         return self._reads_delays(exprs)
+
+    def check_steps(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Refuse held inputs whose steps are seen by what takes the values of their instant."""
+        # A step takes a little time in a run with derivatives.
+        way = Direction(of=dict.fromkeys("txu", self._everywhere))
+        caught = self.changes(list(self.catching.values()), way)
+        values = evaluate_expressions(caught, arrays, searches_of(self.equations))
+        catches = any(np.any(value != 0.0) for value in values)
+        readers = {
+            "a guard": self.guards, "a delay": self.single_arriving,
+            "a memory that keeps what a signal has been": self.of_memories if catches else [],
+        }  # fmt: skip
+        for reader, exprs in readers.items():
+            if reads(exprs, "u", range(self.inputs)):
+                raise CompileError(
+                    f"{reader} sees the steps of held inputs: with hold='zoh' its derivatives are "
+                    "not known; put a lag in between (nlctl.Lag), or take differences of runs"
+                )
 
     @property
     def _delayed_samples(self) -> set[int]:

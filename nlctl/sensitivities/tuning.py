@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Protocol
 
 import control as ct
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from ..annotations import as_annotated
-from ..arguments import number, tolerances
+from ..arguments import number, one_of, tolerances
 from ..diagrams import state_names
 from ..errors import ParameterError
 from ..names import find_name, in_one_spelling
@@ -22,7 +21,7 @@ from ..native.diagram.checks import sized
 from ..native.ensemble import MetricLike
 from ..native.floats import float_parameters, with_floats
 from ..params import as_numbers, checked_times, integer
-from ..responses.arguments import checked_params, input_array, state_array, with_aliases
+from ..responses.arguments import HOLDS, checked_params, state_array, with_aliases
 from ..wording import counted
 from .climbing import lower_cost, raise_least_margin
 from .names import checked_names, declared_bounds
@@ -75,6 +74,7 @@ def tune(
     *,
     cost: MetricLike | None = None,
     samples: Mapping[str, Any] | None = None,
+    hold: str = "foh",
     params: Mapping[str, Any] | None = None,
     starts: int = 3,
     seed: int = 0,
@@ -120,6 +120,8 @@ def tune(
     samples : mapping, optional
         ``{"plant.m": array of shape (n,)}``, also ``"plant.x1(0)"``: each choice of gains is run
         with all n of these.
+    hold : {"foh", "zoh"}, optional
+        What inputs are between `timepts`, as in `nlctl.input_output_response`.
     params : mapping, optional
         Parameters that are overridden and not tuned.
     starts : int, optional
@@ -175,7 +177,7 @@ def tune(
     named = with_aliases(named, aliases, tune, needed=())
     problem, start = _problem(
         diagram, (space, spec, cost, samples), (*named.values(), checked_params(params)),
-        {"rtol": rtol, "atol": atol, "max_steps": max_steps},
+        {"rtol": rtol, "atol": atol, "max_steps": max_steps, "hold": hold},
     )  # fmt: skip
     number("tune", "budget", budget, above=0)
     starts = integer("tune", "starts", starts, at_least=1)
@@ -245,20 +247,17 @@ def _tuned(runs: Runs, first: np.ndarray, message: str) -> Tuned:
 
 def _between(problem: TuningProblem, best: np.ndarray, seen: Worth) -> Iterator[str]:
     """Yield which requirements have a lower margin between the samples."""
-    system, times = problem.diagram.system, problem.times
-    if ct.isdtime(system, strict=True) or not problem.margins:
+    if ct.isdtime(problem.diagram.system, strict=True) or not problem.margins:
         return
-    parts = np.arange(_FINER * (times.size - 1) + 1) / _FINER
-    finer = np.interp(parts, np.arange(times.size), times)
-    inputs = [np.interp(finer, times, u) for u in input_array(system, problem.inputs, times)]
-    denser = replace(problem, times=finer, inputs=np.array(inputs) if inputs else 0.0)
+    denser = problem.with_samples(_FINER)
     lower = _by_key(problem, Runs(denser).at(best[None, :])[0])
     rows = [(m.key, _by_key(problem, seen)[m.key], lower[m.key]) for m in problem.margins]
     for key, margin, below in rows:
         if below < margin - _BETWEEN * (1.0 + abs(margin)):
+            samples = counted(denser.times.size, "sample")
             yield (
-                f"the margin of '{key}' is {below:.4g} with {counted(finer.size, 'sample')}, not "
-                f"{margin:.4g}: give more timepts than {times.size}"
+                f"the margin of '{key}' is {below:.4g} with {samples}, not {margin:.4g}: give "
+                f"more timepts than {problem.times.size}"
             )
 
 
@@ -303,6 +302,7 @@ def _problem(
     """Return what is asked of runs, and the gains to start from."""
     (space, spec, cost, samples), (timepts, inputs, initial_state, params) = what, given
     tolerances("tune", how["rtol"], how["atol"])
+    one_of("tune", "hold", how["hold"], HOLDS)
     if not isinstance(diagram, Compiled):
         diagram = compile_diagram(sized(diagram, timepts, inputs, initial_state), params=params)
     diagram = with_floats(diagram, checked_names("space", [name for name, _ in _bounds(space)]))

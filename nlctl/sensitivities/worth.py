@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import AlgebraicLoopError, CompileError, DivergedError, ParameterError
 from ..native import Compiled, ensemble_response
 from ..native.ensemble import MetricLike
+from ..responses.arguments import input_array, interpolated
 from .gradients import metric_gradient
 from .names import parameters_and_states
 from .response import sensitivity_response
@@ -40,7 +41,7 @@ class TuningProblem:
     high: np.ndarray
     margins: tuple[MetricLike, ...]  # larger is better, > 0 holds
     cost: MetricLike | None  # smaller is better
-    how: Mapping[str, Any]  # tolerances and steps of the runs
+    how: Mapping[str, Any]  # tolerances, steps and hold of the runs
 
     @property
     def metrics(self) -> tuple[MetricLike, ...]:
@@ -56,6 +57,16 @@ class TuningProblem:
     def parts(self) -> tuple[tuple[MetricLike, ...], ...]:
         """The same without rows."""
         return tuple(tuple(p for row in rows for p in row) for rows in self.rows)
+
+    def with_samples(self, many: int) -> TuningProblem:
+        """Return the same runs with so many times as many samples."""
+        times = self.times
+        parts = np.arange(many * (times.size - 1) + 1) / many
+        finer = np.interp(parts, np.arange(times.size), times)
+        u = input_array(self.diagram.system, self.inputs, times)
+        held = self.how["hold"] == "zoh"
+        u = u[:, parts.astype(int)] if held else interpolated(u, times, finer)
+        return replace(self, times=finer, inputs=u if u.size else 0.0)
 
     @property
     def _as_powers(self) -> np.ndarray:

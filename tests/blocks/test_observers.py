@@ -242,6 +242,20 @@ class TestExtendedKalmanFilter:
         exact = [[x1 / np.hypot(1, x1), 0], [0, np.exp(x2) / 2]]
         np.testing.assert_allclose(H, exact, rtol=1e-13, atol=1e-15)
 
+    @given(st.floats(-2, 2), st.floats(-2, 2))
+    def test_at_a_point_with_an_expression_of_its_own_they_are_those_next_to_it(self, x1, x2):
+        """f = x1 (1 - 2 |x1| x2), written apart where x1 is 0 and where both are equal."""
+
+        def f(x):
+            v, z = x
+            w = v * (1 - 2 * np.sign(v) * v * z) if v != 0 else 0.0
+            return (w if v != z else v - 2 * v * abs(v) * v,)
+
+        made = jacobian_function(f, 2)
+        for v, z in ((x1, x2), (0.0, x2), (x2, x2), (0.0, 0.0)):
+            exact = [[1 - 4 * abs(v) * z, -2 * abs(v) * v]]
+            np.testing.assert_allclose(made(np.array([v, z])), exact, rtol=0, atol=1e-5)
+
     @every_engine
     def test_a_pendulum_is_found_from_its_angle(self, engine):
         """From an error of 1 rad and 1 rad/s, without noise; everything is machine code."""

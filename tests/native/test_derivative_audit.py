@@ -177,3 +177,16 @@ def test_what_leaves_a_delay_is_named():
     of_r, of_delayed = sorted(str(warning.message) for warning in caught)[::-1]
     assert of_r.startswith(f"{rate} 'r' is 0")
     assert of_delayed.startswith(f"{rate} 'late.y' is 0")
+
+
+def test_warnings_name_the_line_that_asks():
+    """Of every way to linearize, python-control's too: a line of this file."""
+    made, x0 = nlctl.compile(block(bristles, 2)), [0.0, 0.0]
+    asking = (
+        lambda: nlctl.linearize(made, x0), lambda: made.linearize(x0),
+        lambda: ct.linearize(made, x0), lambda: nlctl.frequency_response(made, [1.0], at=x0),
+    )  # fmt: skip
+    for ask in asking:
+        with pytest.warns(errors.InexactWarning) as caught:
+            ask()
+        assert {warning.filename for warning in caught} == {__file__}

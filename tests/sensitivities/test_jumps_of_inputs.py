@@ -3,9 +3,10 @@
 import control as ct
 import numpy as np
 import pytest
-from closed_form_runs import Ball, block
+from closed_form_runs import Ball, Tank, block
 
 import nlctl
+from nlctl.analysis.metrics import Metric
 
 T = 0.7
 
@@ -230,3 +231,163 @@ def test_play_in_an_algebraic_loop():
         ("gap.c_r", -np.ones(3) / 1.5),
     ):
         assert np.allclose(made["w", name][1:], slope, rtol=0, atol=1e-7)
+
+
+# -- held inputs -----------------------------------------------------------------------------------
+
+HELD, TIMES = np.array([0.0, 1.7, -0.4, 1.1, -1.6, 0.2, 0.9]), 0.5 * np.arange(7.0)
+
+
+def follower(rate, params, name="plant"):
+    """x' by x and an input r."""
+    return ct.nlsys(
+        rate, lambda t, x, u, p: x, inputs=["r"], outputs=["x"], states=["x"], params=params,
+        name=name,
+    )  # fmt: skip
+
+
+def differences(loop, name, value, start, h=1e-3):
+    """Richardson differences of tight runs with held inputs."""
+    compiled = nlctl.compile(loop)
+    rows = []
+    for step in (h, h / 2):
+        runs = [
+            nlctl.input_output_response(
+                compiled, TIMES, HELD, start, params={name: value + side * step}, hold="zoh",
+                rtol=1e-11, atol=1e-13,
+            ).outputs for side in (1, -1)
+        ]  # fmt: skip
+        rows.append((runs[0] - runs[1]) / (2 * step))
+    return (4 * rows[1] - rows[0]) / 3
+
+
+def test_a_lag_of_held_inputs():
+    """x' = b r - a x: by a and b in closed form from sample to sample, and by the start."""
+    loop = follower(lambda t, x, u, p: [p["b"] * u[0] - p["a"] * x[0]], {"a": 0.8, "b": 1.3})
+    by = ["plant.a", "plant.b", "plant.x(0)"]
+    made = nlctl.sensitivity_response(
+        loop, TIMES, HELD, 0.5, with_respect_to=by, hold="zoh", rtol=1e-10, atol=1e-12
+    )
+    a, b, dt = 0.8, 1.3, 0.5
+    x, by_a, by_b, by_start = 0.5, 0.0, 0.0, 1.0
+    fade = np.exp(-a * dt)
+    for k, r in enumerate(HELD):
+        exact = [by_a, by_b, by_start]
+        assert [made["x", name][k] for name in by] == pytest.approx(exact, abs=1e-8)
+        by_a = fade * by_a - dt * fade * x + b * r * (dt * fade / a - (1 - fade) / a**2)
+        by_b, by_start = fade * by_b + r * (1 - fade) / a, fade * by_start
+        x = fade * x + b * r * (1 - fade) / a
+
+
+STEPPED = {
+    "jump": (lambda t, x, u, p: [np.where(u[0] + x[0] > p["a"], 1.0, -0.5) - x[0]], 0.3),
+    "sign": (lambda t, x, u, p: [np.sign(u[0] - p["a"]) * (2 + x[0]) * p["a"] - x[0]], 0.6),
+    "kink": (lambda t, x, u, p: [np.maximum(u[0], p["a"] * x[0]) - x[0]], 0.4),
+}
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_conditions_that_held_inputs_step_across(name):
+    """What a step takes across does not move with anything."""
+    rate, a = STEPPED[name]
+    loop = follower(rate, {"a": a})
+    made = nlctl.sensitivity_response(
+        loop, TIMES, HELD, 0.2, with_respect_to="plant.a", hold="zoh", rtol=1e-10, atol=1e-12
+    )
+    exact = differences(loop, "plant.a", a, 0.2)
+    np.testing.assert_allclose(made["x", "plant.a"], exact, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("record", [
+    nlctl.Backlash(c_r=0.4, c_l=-0.5, m_r=1.2, m_l=0.9), nlctl.Relay(on=0.5, off=-0.2, height=0.8),
+], ids=["play", "relay"])  # fmt: skip
+def test_memories_behind_held_inputs(record):
+    """A lead filter in front of a play and of a relay: steps drive these to and fro."""
+    lead = ct.nlsys(
+        lambda t, x, u, p: [p["g"] * (u[0] - x[0])], lambda t, x, u, p: [x[0] + 0.5 * u[0]],
+        inputs=["r"], outputs=["u"], states=["z"], params={"g": 3.0}, name="lead",
+    )  # fmt: skip
+    parts = {"lead": lead, "actuator": nlctl.block(record, "actuator"), "integral": INTEGRAL}
+    loop = nlctl.interconnect(parts, inputs=["r"], outputs=["y"])
+    made = nlctl.sensitivity_response(
+        loop, TIMES, HELD, with_respect_to="lead.g", hold="zoh", rtol=1e-10, atol=1e-12
+    )
+    exact = differences(loop, "lead.g", 3.0, 0.0)
+    np.testing.assert_allclose(made["y", "lead.g"], exact, rtol=1e-6, atol=1e-7)
+
+
+INTEGRAL = ct.nlsys(
+    lambda t, x, u, p: u, lambda t, x, u, p: x, inputs=["v"], outputs=["y"], states=["y"],
+    name="integral",
+)  # fmt: skip
+
+
+def test_a_play_behind_a_steep_ramp():
+    """A ramp of 1e-9 s is no corner that lies ahead: v = m (u - c) has -m by c, also next to it."""
+    loop = nlctl.block(nlctl.Backlash(c_r=0.4, c_l=-0.5, m_r=1.2, m_l=0.9), "play")
+    t = np.array([0.0, 1.0, 1.0 + 1e-9, 2.0, 2.0 + 1e-9, 3.0])
+    u = np.array([0.0, 0.0, 2.0, 2.0, -1.0, -1.0])
+    made = nlctl.sensitivity_response(loop, t, u, with_respect_to=["play.c_r", "play.c_l"])
+    assert made.success
+    assert made["v", "play.c_r"] == pytest.approx([0, 0, -1.2, -1.2, 0, 0], abs=1e-9)
+    assert made["v", "play.c_l"] == pytest.approx([0, 0, 0, 0, -0.9, -0.9], abs=1e-9)
+
+
+@pytest.mark.parametrize("part", ["a guard", "a delay"])
+def test_what_sees_the_instant_of_a_step_is_refused(part):
+    """By name, with what to do instead."""
+    if part == "a delay":
+        loop = nlctl.block(nlctl.TransportDelay(inputs=("r",), outputs=("x",), delay=0.3), "late")
+        by = "late.delay"
+    else:
+        loop, by = nlctl.block(Tank(), "tank"), "tank.q"
+    with pytest.raises(nlctl.errors.CompileError, match=f"{part} sees the steps of held inputs"):
+        nlctl.sensitivity_response(loop, TIMES, 2 + HELD, with_respect_to=by, hold="zoh")
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_a_play_behind_a_table(periodic):
+    """u = K r - t with r held at 0 and 1.5: driven left until t = 1, then right, where it stays."""
+    table = nlctl.sources.TimeTable(
+        times=(0.0, 1.0, 2.0), values=(0.0, 1.5, 0.0), hold=True, periodic=periodic
+    )
+    law = ct.nlsys(
+        None, lambda t, x, u, p: [p["K"] * u[0] - t], inputs=["r"], outputs=["u"],
+        params={"K": 1.0}, name="law",
+    )  # fmt: skip
+    record = nlctl.Backlash(c_r=0.3, c_l=-0.25, m_r=1.1, m_l=0.9)
+    parts = {"table": nlctl.block(table, "table", outputs=["r"]), "law": law,
+             "play": nlctl.block(record, "play")}  # fmt: skip
+    loop = nlctl.interconnect(parts, outputs=["v"])
+    by = ["law.K", "play.c_r", "play.c_l"]
+    made = nlctl.sensitivity_response(loop, [0, 0.9, 1.05, 1.5], with_respect_to=by)
+    assert made.success
+    np.testing.assert_allclose(
+        made.derivatives[0].T[1:], [[0, 0, -0.9], [1.65, -1.1, 0], [1.65, -1.1, 0]], atol=1e-7
+    )
+
+
+def test_fit_and_tune_take_held_inputs():
+    """The lag that python-control's own sampling says; a note of margins between samples, too."""
+    loop = follower(lambda t, x, u, p: [u[0] - p["a"] * x[0]], {"a": 0.8})
+    exact = ct.sample_system(ct.ss(-0.8, 1, 1, 0), 0.5, "zoh")
+    data = np.ravel(ct.forced_response(exact, TIMES, HELD).outputs)
+    found = nlctl.fit(loop, TIMES, {"x": data}, {"plant.a": 1.5}, HELD, hold="zoh")
+    assert abs(found["plant.a"] - 0.8) < 1e-6
+    other = nlctl.fit(loop, TIMES, {"x": data}, {"plant.a": 1.5}, HELD)
+    assert abs(other["plant.a"] - 0.8) > 1e-2
+    missed = Metric(
+        key="missed", signal="x", function=lambda t, x: float(np.sum((x - data) ** 2)), unit="1",
+        meaning="squares",
+    )  # fmt: skip
+    tuned = nlctl.tune(
+        loop, {"plant.a": (1.5, 0.2, 3.0)}, [], 60, TIMES, HELD, cost=missed, hold="zoh"
+    )
+    assert abs(tuned["plant.a"] - 0.8) < 1e-2
+    for run in (nlctl.fit, nlctl.tune, nlctl.sensitivity_response):
+        given = {"hold": "zero"}
+        given |= {nlctl.fit: {"data": {"x": data}, "parameters": {"plant.a": 1.0}},
+                  nlctl.tune: {"space": {"plant.a": (0.2, 3.0)}, "spec": [], "cost": missed},
+                  nlctl.sensitivity_response: {"with_respect_to": "plant.a"}}[run]  # fmt: skip
+        with pytest.raises(nlctl.errors.ParameterError, match="hold to be 'foh' or 'zoh'"):
+            run(loop, timepts=TIMES, inputs=HELD, **given)
