@@ -24,6 +24,10 @@ class Special:
         """Return an operation by its name, on operands of which one is this."""
         raise Untraceable(f"{name} of {type(self).__name__}")
 
+    def as_array(self) -> Tracer:
+        """Return the plain array that ``np.asarray`` makes of this."""
+        raise Untraceable(f"{type(self).__name__} instead of an array")
+
 
 class Computed(Special):
     """What has the operators of arithmetic, by its operations."""
@@ -373,7 +377,7 @@ def traced(graph: Graph, value: object) -> Tracer:
         return value
     if type(value) is float or type(value) is bool:
         return scalar(graph, graph.const(value))
-    if isinstance(value, Special):
+    if isinstance(value, Special):  # functions of NumPy make of some of these others of their kind
         raise Untraceable(f"{type(value).__name__} instead of an array")
     if isinstance(value, list | tuple):
         parts = [traced(graph, v) for v in value]

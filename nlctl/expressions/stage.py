@@ -34,13 +34,13 @@ from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined, whole_numbers
 from .library.linear_maps import enter_linear_maps
 from .library.python import NUMBER_SAMPLES, Builtins, of_math
-from .library.roots import roots
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
+from .roots import roots
 from .source import codes_in, is_dispatcher
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice, Fraction)

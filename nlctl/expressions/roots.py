@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from ..arrays import Special, Tracer, scalar, traced
-from ..graph import Expr, Graph, Untraceable
-from ..operators import elementwise
-from .rotated import in_passes
+from .arrays import Special, Tracer, scalar, traced
+from .derivatives import slope
+from .graph import Untraceable
+from .library.rotated import in_passes
+from .operators import elementwise
 
 _ROUNDING = 1e-15  # relative to the larger of 1 and the root
 
@@ -37,8 +38,6 @@ class SlopeOfRoot(Special):
     """Gives a root its slope: that of what is 0 there, not of passes that happen to end early."""
 
     # A search that begins at the root ends at once: what it returns does not move with f.
-    slope: ClassVar[Callable[[Graph, Expr, Expr], Expr]]  # see `derivatives`
-
     def __call__(self, f: Callable[..., Any], root: Any, args: Sequence[Any]) -> Any:
         if not isinstance(root, Tracer) or root.shape or root.only.op == "const":
             return root
@@ -49,9 +48,7 @@ class SlopeOfRoot(Special):
         if value.shape:
             return root
         with in_passes(graph):
-            step = scalar(graph, value.only) / scalar(
-                graph, SlopeOfRoot.slope(graph, value.only, place.only)
-            )
+            step = scalar(graph, value.only) / scalar(graph, slope(graph, value.only, place.only))
             near = _ROUNDING * op("maximum", 1.0, op("absolute", place))
             return op("select", op("le", op("absolute", step), near), place - step, root)
 
