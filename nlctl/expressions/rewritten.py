@@ -363,7 +363,8 @@ def is_raised(error: BaseException) -> bool:
     is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
     is_staged |= code in (_item.__code__, NumberKeys.__getitem__.__code__)
     raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
-    return is_staged and (raises or isinstance(error, _PYTHONS))
+    of_none = isinstance(error, TypeError) and "NoneType" in str(error)  # what nobody returned
+    return is_staged and (raises or of_none or isinstance(error, _PYTHONS))
 
 
 def _item(graph: Graph, whole: Any, key: object) -> Any:

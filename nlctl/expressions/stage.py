@@ -200,6 +200,8 @@ class Stage:
         if isinstance(value, CPUDispatcher | FunctionType):
             if value in (dataclasses.dataclass, collections.namedtuple, typing.NamedTuple):
                 return value  # they look at types, defaults and names alone
+            if value in (dataclasses.replace, dataclasses.asdict, dataclasses.astuple):
+                return functools.partial(staged.of_fields, self, value)
             if staged.is_of_a_library(value):
                 return self._library("", value)
             return self.for_numbers(value) if computes_gains(value) else self.copied(value)

@@ -404,7 +404,8 @@ class Expressions(ast.NodeVisitor):
             base = self.visit(node.func.value)
             bound = known_calls.method(self.walk, base, node.func.attr, given)
             if bound is not None:
-                self.kept(base, given.every)
+                if node.func.attr not in known_calls.named.READING:
+                    self.kept(base, given.every)
                 return bound
         function = self.visit(node.func)
         given = made.with_field_names(node, function.known, given)
@@ -424,7 +425,8 @@ class Expressions(ast.NodeVisitor):
         reaches = any(v.holds for v in given.every) or not all(plain)
         if self.walk.keeps > before and reaches:
             self.lists_may_hold_others()
-        if not all(p or isinstance(f.known, Local) for p, f in zip(plain, called, strict=True)):
+        takes = [isinstance(f.known, Local) or f.known in known_calls.TAKING for f in called]
+        if not all(p or t for p, t in zip(plain, takes, strict=True)):
             for value in given.every:  # a list may have been given something to keep
                 self.kept(value, given.every)
         return result

@@ -69,6 +69,7 @@ CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | f
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
+TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
 
 
 def call(walk: Walk, thing: object, given: Given) -> KnownValue:
