@@ -394,7 +394,7 @@ def traced(graph: Graph, value: object) -> Tracer:
     if not (type(value) is np.ndarray or isinstance(value, bool | int | float | np.generic)):
         raise Untraceable(f"values of type {type(value).__name__}")
     array = np.asarray(value)
-    if array.dtype == object and all(_is_number(v) for v in array.flat):
+    if array.dtype == object and array.shape and all(_is_number(v) for v in array.flat):
         return traced(graph, array.tolist())  # what NumPy has made of tracers, one by one
     if array.dtype not in (np.dtype(float), np.dtype(int), np.dtype(bool)):
         raise Untraceable(f"values of type {array.dtype}")  # they would be rounded otherwise

@@ -260,13 +260,13 @@ _OF_INTEGRALS = {
     "exprel": _relative_exponential,
     "entr": lambda np, x: np.where(x > 0.0, -x * np.log(np.where(x > 0.0, x, 1.0)),
                                    np.where(x == 0.0, 0.0, np.where(x < 0.0, -math.inf, x))),
-    "log_softmax": lambda np, x, axis=None: x - _kept_logsumexp(np, x, axis),
+    "log_softmax": lambda np, x, axis=None: _log_softmax(np, x, axis),
 }  # fmt: skip
 
 
-def _kept_logsumexp(np: Facade, x: object, axis: object) -> Any:
-    top = np.max(x, axis=axis, keepdims=True)
-    return top + np.log(np.sum(np.exp(x - top), axis=axis, keepdims=True))
+def _log_softmax(np: Facade, x: Any, axis: object) -> Any:
+    below = x - np.max(x, axis=axis, keepdims=True)
+    return below - np.log(np.sum(np.exp(below), axis=axis, keepdims=True))
 
 
 def xlogy(np: Facade, x: Any, y: Any) -> Any:

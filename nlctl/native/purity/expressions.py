@@ -293,7 +293,8 @@ class Expressions(ast.NodeVisitor):
         for part in node.keys:
             if part is not None:
                 self.visit(part)
-        return holder([self.visit(part) for part in node.values])
+        parts = zip(node.keys, map(self.visit, node.values), strict=True)
+        return holder([element(value) if key is None else value for key, value in parts])
 
     def visit_Starred(self, node: ast.Starred) -> KnownValue:
         value = self.visit(node.value)
@@ -355,7 +356,7 @@ class Expressions(ast.NodeVisitor):
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
         if isinstance(thing, Unknown):
-            return base
+            return replace(base, own=base.own and (base.inside or not base.holds))
         if isinstance(thing, Pure):
             return replace(base, own=base.inside)
         if isinstance(thing, Instance):
