@@ -22,7 +22,7 @@ __all__: list[str] = []
 
 Axis = Any
 _MIDDLE = 64  # elements beyond which no extremes are written out
-_WIDE = 8  # elements of which all ties are looked at, before these are repeated
+_WIDE = 8  # elements of which all ties are tried, before these are repeated
 
 
 def folded(
