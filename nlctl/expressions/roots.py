@@ -33,7 +33,7 @@ def roots() -> dict[Any, Callable[..., Any]]:
 
     return {
         optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton,
-        optimize.root_scalar: root_scalar, optimize.fsolve: fsolve, optimize.root: root,
+        optimize.root_scalar: root_scalar, optimize.fsolve: fsolve, optimize.root: root_by_powell,
     }  # fmt: skip
 
 
@@ -208,7 +208,7 @@ def _secants(func, p0, p1, args, tol, maxiter, rtol):
     raise RuntimeError("Failed to converge")
 
 
-def root(fun, x0, args=(), method="hybr", jac=None, tol=None):
+def root_by_powell(fun, x0, args=(), method="hybr", jac=None, tol=None):
     """Return a root of one function of one number by MINPACK's method, as `fsolve` does."""
     if method != "hybr" or jac:
         return refused(f"scipy.optimize.root by {method}, or with derivatives")
