@@ -24,6 +24,10 @@ class Special:
         """Return an operation by its name, on operands of which one is this."""
         raise Untraceable(f"{name} of {type(self).__name__}")
 
+    def as_array(self) -> Tracer:
+        """Return the plain array that ``np.asarray`` makes of this."""
+        raise Untraceable(f"{type(self).__name__} instead of an array")
+
 
 class Computed(Special):
     """What has the operators of arithmetic, by its operations."""
@@ -373,7 +377,7 @@ def traced(graph: Graph, value: object) -> Tracer:
         return value
     if type(value) is float or type(value) is bool:
         return scalar(graph, graph.const(value))
-    if isinstance(value, Special):
+    if isinstance(value, Special):  # functions of NumPy make of some of these others of their kind
         raise Untraceable(f"{type(value).__name__} instead of an array")
     if isinstance(value, list | tuple):
         parts = [traced(graph, v) for v in value]
@@ -390,7 +394,7 @@ def traced(graph: Graph, value: object) -> Tracer:
     if not (type(value) is np.ndarray or isinstance(value, bool | int | float | np.generic)):
         raise Untraceable(f"values of type {type(value).__name__}")
     array = np.asarray(value)
-    if array.dtype == object and all(_is_number(v) for v in array.flat):
+    if array.dtype == object and array.shape and all(_is_number(v) for v in array.flat):
         return traced(graph, array.tolist())  # what NumPy has made of tracers, one by one
     if array.dtype not in (np.dtype(float), np.dtype(int), np.dtype(bool)):
         raise Untraceable(f"values of type {array.dtype}")  # they would be rounded otherwise

@@ -9,9 +9,9 @@ size: what z' is otherwise, such as the unit of a direction, does not matter.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,9 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
-from .library.roots import SlopeOfRoot
+from .library.table import on_expressions
 from .linear_systems import changed_solution, solution
-from .stage import Stage
+from .operators import elementwise
 
 
 def tangents(
@@ -42,13 +42,10 @@ def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
     return _Reader(graph, lambda _: None, {}).partial
 
 
-def _slope(graph: Graph, result: Expr, number: Expr) -> Expr:
+def slope(graph: Graph, result: Expr, number: Expr) -> Expr:
     """Return the derivative of an expression by one that it is made of, all else fixed."""
     reader = _Reader(graph, lambda _: None, {}, {number: graph.const(1.0)})
     return reader.read([result])[0] or graph.const(0.0)
-
-
-SlopeOfRoot.slope = _slope
 
 
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
@@ -118,11 +115,6 @@ class _Reader:
         self.known: dict[Expr, Expr | None] = dict(known or {})
         self._partials: dict[tuple[str, int], Any] = {}
 
-    @cached_property
-    def _stage(self) -> Stage:
-        """Where formulas of derivatives are traced; most readers need none."""
-        return Stage(self.graph)
-
     def read(self, results: list[Expr]) -> list[Expr | None]:
         """Return the derivatives of results."""
         for node in needed(results):
@@ -163,10 +155,10 @@ class _Reader:
         units = [self.graph.table(row) for row in np.eye(n).tolist()]
         columns = [read(lambda _: None, unit) for unit in units]
         matrix = [[float(i == j) - columns[j][i] for j in range(n)] for i in range(n)]
-        solve = self._stage.copied(linear_solution)
+        solve = on_expressions(self.graph, linear_solution)
         changes, is_regular = solve(matrix, read(self.seed, None))
-        where = self._stage.numpy.where
-        parts = [scalar(self.graph, where(is_regular, c, np.nan).only) for c in changes]
+        where = functools.partial(elementwise, self.graph, "select", is_regular)
+        parts = [where(change, np.nan) for change in changes]
         return self.graph.joined([(part.only, 1) for part in parts])
 
     @property
@@ -198,7 +190,7 @@ class _Reader:
         n = lu.data[0]
         whole = solution(graph, lu, n, [(graph.item(matrix, k), 1) for k in range(n * n)])
         diagonal = (graph.item(whole, k) for k in range(0, n * n, n + 1))
-        return graph.op("mul", node, reduce(lambda a, b: graph.op("add", a, b), diagonal))
+        return graph.op("mul", node, functools.reduce(lambda a, b: graph.op("add", a, b), diagonal))
 
     def _lu_regular(self, node: Expr, matrix: Expr) -> None:
         """It is the same almost everywhere."""
@@ -215,7 +207,7 @@ class _Reader:
         """Return a partial derivative of a function of the table; its row is traced for that."""
         if (node.op, i) not in self._partials:
             function = FUNCTIONS[node.op].derivative[i]
-            self._partials[node.op, i] = self._stage.copied(function)
+            self._partials[node.op, i] = on_expressions(self.graph, function)
         given = [scalar(self.graph, self.graph.number(arg)) for arg in node.args]
         return self._partials[node.op, i](*given).only
 

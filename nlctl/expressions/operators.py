@@ -227,23 +227,39 @@ def is_of_arrays(expr: Expr) -> bool:
     )
 
 
+def _without_offset(number: Expr) -> tuple[Expr, int]:
+    """Return k and 1 of k + 1: what is decided of one is of all."""
+    more = 0
+    while number.op in ("add", "sub"):
+        left, right = number.args
+        if right.op == "const":
+            more += int(right.data) if number.op == "add" else -int(right.data)
+            number = left
+        elif left.op == "const" and number.op == "add":
+            number, more = right, more + int(left.data)
+        else:
+            break
+    return number, more
+
+
 def _integer(self: Tracer) -> int:
     """Return an integer; one that the state decides is followed to each of its values."""
     if not _is_integer(self):
         raise Untraceable("an integer that depends on the state")
     if self.only.value is not None:
         return self.graph.assumed(self.only)
-    number, beyond = self.only, []
+    (number, more), beyond = _without_offset(self.only), []
+    whole = number
     if number.op == "select" and number.args[2].data == NO_INTEGER:
         number, beyond = number.args[1], [int(NO_INTEGER)]  # of NaN, what NumPy makes of it
     low, high = integer_range(number)
     if high - low >= _FOLLOWED:
         raise Untraceable("an integer that may have too many values")
     values = [*range(int(low), int(high) + 1), *beyond]
-    equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
+    equal = {k: self.graph.op("eq", whole, self.graph.const(k)) for k in values}
     decided = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
     self.graph.implied.update({equal[k]: k == decided for k in values})
-    return decided
+    return decided + more
 
 
 def _hash(self: Tracer) -> int:

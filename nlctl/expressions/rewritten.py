@@ -363,7 +363,7 @@ def is_raised(error: BaseException) -> bool:
     is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
     is_staged |= code in (_item.__code__, NumberKeys.__getitem__.__code__)
     raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
-    return is_staged and (raises or isinstance(error, _PYTHONS))
+    return is_staged and (raises or isinstance(error, _PYTHONS) or "NoneType" in str(error))
 
 
 def _item(graph: Graph, whole: Any, key: object) -> Any:
@@ -465,8 +465,10 @@ class NumberKeys(dict[Any, Any]):
 
     def _chosen(self, key: Tracer, choice: object) -> Any:
         numbers = all(isinstance(v, int | float | Tracer) for v in (*self.values(), choice))
-        if key.shape or not numbers or not all(isinstance(k, _KEYS) for k in self):
+        if key.shape or not all(isinstance(k, _KEYS) for k in self):
             raise Untraceable("a key that is only known when it runs")
+        if not numbers:
+            return next((value for k, value in self.items() if _is_key(key, k)), choice)
         for k, value in reversed(self.items()):
             choice = elementwise(key.graph, "select", _is_key(key, k), value, choice)
         return choice

@@ -34,13 +34,13 @@ from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined, whole_numbers
 from .library.linear_maps import enter_linear_maps
 from .library.python import NUMBER_SAMPLES, Builtins, of_math
-from .library.roots import roots
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
+from .roots import roots
 from .source import codes_in, is_dispatcher
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice, Fraction)
@@ -200,6 +200,8 @@ class Stage:
         if isinstance(value, CPUDispatcher | FunctionType):
             if value in (dataclasses.dataclass, collections.namedtuple, typing.NamedTuple):
                 return value  # they look at types, defaults and names alone
+            if value in (dataclasses.replace, dataclasses.asdict, dataclasses.astuple):
+                return functools.partial(staged.of_fields, self, value)
             if staged.is_of_a_library(value):
                 return self._library("", value)
             return self.for_numbers(value) if computes_gains(value) else self.copied(value)

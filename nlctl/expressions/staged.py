@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import inspect
 import itertools
@@ -181,6 +182,23 @@ class StagedObject:
         if is_law(self._real) and holds_tracers([*arguments, *options.values()]):
             return FrozenLaw(self._stage.graph, self, arguments, options)
         return self._stage.called_object(self._real)(*arguments, **options)
+
+
+def of_fields(stage: OnStage, function: Any, thing: Any, **changes: object) -> Any:
+    """Return what a function of `dataclasses` makes, also of an object that was there before."""
+    real = getattr(thing, "__dict__", {}).get("_real")
+    fields = dataclasses.fields(thing if real is None else real)
+    parts = {f.name: getattr(thing, f.name) for f in fields}
+    if real is not None and function is dataclasses.replace:
+        given = {f.name: parts[f.name] for f in fields if f.init}
+        return stage.instead(type(real))(**{**given, **changes})
+    if real is not None:
+        return stage.instead(function(real, **changes))
+    plain = all(isinstance(v, Tracer | int | float | str) for v in parts.values())
+    if function is dataclasses.replace or changes or not plain:
+        return stage.copied(function)(thing, **changes)
+    copies = {k: v.copy() if getattr(v, "shape", ()) else v for k, v in parts.items()}
+    return copies if function is dataclasses.asdict else tuple(copies.values())
 
 
 def _of_held_law(law: StagedObject, name: str, x: Any, *numbers: Any, **named: Any) -> Any:

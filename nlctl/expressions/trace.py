@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Computed, Tracer, concatenated, scalar, traced
+from .arrays import Special, Tracer, concatenated, scalar, traced
 from .graph import (
     BUDGET,
     UNLIMITED,
@@ -225,7 +225,7 @@ def _flat(graph: Graph, value: object) -> Tracer:
     # what no case is for: python-control raises an error
     if value is None and graph.decisions and graph.nothing_fails:
         raise catchable(TypeError)
-    value = getattr(value, "A", value) if isinstance(value, Computed) else value  # of np.matrix
+    value = value.as_array() if isinstance(value, Special) else value
     if isinstance(value, tuple | list):
         return concatenated(graph, [traced(graph, v).there().reshape(-1) for v in value])
     return traced(graph, value).there().reshape(-1)

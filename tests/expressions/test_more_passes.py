@@ -172,7 +172,7 @@ def test_what_is_not_written_out_is_no_error():
 
 
 REMEDIES = {
-    "algebraic loop": lambda x: optimize.fsolve(lambda z: z + np.sin(z) - x[0], x[0])[0],
+    "algebraic loop": lambda x: optimize.fsolve(lambda z: z + np.sin(z) - x[0], [x[0], 1.0])[0],
     "scipy.optimize.brentq": lambda x: optimize.toms748(lambda z: z**3 + z - x[0], -9, 9),
     "CubicSpline": lambda x: special.yv(2, x[0]),
     "a finite one": lambda x: integrate.quad(lambda s: np.exp(-s) * x[0], 0, np.inf)[0],

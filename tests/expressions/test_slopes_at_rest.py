@@ -23,6 +23,8 @@ SEARCHES = {
     "brentq, at an end": lambda x: optimize.brentq(lambda z: z**3 + 2 * z - x, 0.0, 5.0),
     "tangents": lambda x: optimize.newton(lambda z: z**3 + 2 * z - x, 0.0, lambda z: 3 * z * z + 2),
     "secants": lambda x: optimize.newton(lambda z: z**3 + 2 * z - x, 0.0),
+    "fsolve": lambda x: optimize.fsolve(lambda z: z**3 + 2 * z - x, 0.0)[0],
+    "root": lambda x: optimize.root(lambda z, a: z**3 + 2 * z - a, [0.5], args=(x,)).x[0],
     "far secants": lambda x: optimize.root_scalar(lambda z: z**3 + 2 * z - x, x0=0.0, x1=2.0).root,
 }
 

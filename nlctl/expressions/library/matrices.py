@@ -109,7 +109,11 @@ class NumpyMatrix(Computed):
         """Return it in another shape."""
         return self._as(self.A.reshape(*shape))
 
-    getA = lambda self: self.A  # noqa: E731 (NumPy's name)
+    def as_array(self) -> Tracer:
+        """Return its elements, which make a matrix no more."""
+        return self.A
+
+    getA = as_array  # NumPy's name
     getA1 = lambda self: self.A1  # noqa: E731
     transpose = lambda self: self.T  # noqa: E731
     ravel = lambda self: self._as(self.A.reshape(-1))  # noqa: E731

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import operator
 from collections.abc import Callable, Sequence
@@ -21,6 +22,7 @@ __all__: list[str] = []
 
 Axis = Any
 _MIDDLE = 64  # elements beyond which no extremes are written out
+_WIDE = 8  # elements of which all ties are tried, before these are repeated
 
 
 def folded(
@@ -284,13 +286,29 @@ def sort(graph: Graph, values: object, axis: object = -1, **_how: object) -> Tra
     return _along(graph, values, axis, lambda row: in_order(graph, row)[0])
 
 
+@functools.cache
+def _keeps_order(n: int) -> bool:
+    """Whether NumPy leaves n elements, where they are equal, as they are: on some machines."""
+    rows = (np.resize(row, n) for row in itertools.product((0.0, 1.0), repeat=min(n, _WIDE)))
+    return all(np.array_equal(np.argsort(r), np.argsort(r, kind="stable")) for r in rows)
+
+
 @of(np.argsort)
-def argsort(graph: Graph, values: object, axis: object = -1, **_how: object) -> Tracer:
-    """Return where the elements of an ordered array were."""
-    # Equal ones stay in their order; NumPy's own depends on the machine there.
+def argsort(
+    graph: Graph, values: object, axis: object = -1, kind: str | None = None, **how: object
+) -> Tracer:
+    """Return where the elements of an ordered array were; called where NumPy mixes equal ones."""
     if traced(graph, values).shape[-1] > 16:
         raise Untraceable("the order of many elements, some of which may be equal")
-    return _along(graph, values, axis, lambda row: in_order(graph, row)[1])
+    is_stable = kind in ("stable", "mergesort") or how.get("stable")
+
+    def places(row: list[Expr]) -> list[Expr]:
+        ordered, order = in_order(graph, row)
+        for a, b in [] if is_stable or _keeps_order(len(row)) else itertools.pairwise(ordered):
+            graph.limited(graph.op("ne", a, b))
+        return order
+
+    return _along(graph, values, axis, places)
 
 
 @of(np.median)

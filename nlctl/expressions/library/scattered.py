@@ -17,6 +17,7 @@ from ..arrays import Tracer, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
 from .reductions import argmin
+from .spectra import guard_finite
 from .table import Facade, known_numbers
 
 __all__: list[str] = []
@@ -99,6 +100,7 @@ def at_the_nearest(graph: Graph, table: Any, *given: Any, **options: object) -> 
         raise Untraceable("NearestNDInterpolator of too many points")
 
     def at(*place: Any) -> Any:
+        guard_finite(graph, list(place), ValueError)
         parts = [(v - traced(graph, points[:, k])) for k, v in enumerate(place)]
         apart = functools.reduce(lambda a, b: a + b, (p * p for p in parts))
         order = sorted_two(graph, apart)

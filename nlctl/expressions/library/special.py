@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import math
 from typing import Any
 
@@ -25,7 +26,7 @@ from .orthogonal import lyapunov, root_of_matrix, scipys_qr
 from .python import guard_whole
 from .reductions import prod, sum_along
 from .shapes import by_moving
-from .spectra import eigh, eigvalsh, pinv, svd
+from .spectra import eigh, eigvalsh, guard_finite, pinv, svd
 from .table import WRITTEN, Facade, enter, formula, of
 
 
@@ -51,6 +52,9 @@ def enter_scipy() -> None:
     for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size)):
         formula(getattr(special, name))(of_gamma)
     enter([linalg.cho_factor], cholesky_factor)
+    for function in (getattr(linalg, name) for name in linalg.__all__):
+        if function in WRITTEN and "check_finite" in inspect.signature(function).parameters:
+            enter([function], _of_finite(WRITTEN[function]))
     _enter_integrals(special)
     for name, formula_of in _FORMULAS.items():
         formula(getattr(special, name))(formula_of)
@@ -147,13 +151,40 @@ def _of_linalg(name: str) -> Any:
             a = traced(graph, arguments[0])  # SciPy reads the triangle that it returns
             lower = arguments[1] if len(arguments) > 1 else lower
             return written(graph, a) if lower else written(graph, a.T).T
+        structure = options.pop("assume_a", None)
         options = {k: v for k, v in options.items() if k not in _HOW}
+        if structure not in (None, "gen", "general"):
+            return _of_structure(graph, structure, *arguments, **options)
         return written(graph, *arguments, **options)
 
     return function
 
 
-_HOW = ("assume_a", "check_finite", "overwrite_a", "overwrite_b")  # how, not what
+_HOW = ("check_finite", "overwrite_a", "overwrite_b")  # how, not what
+
+
+def _of_structure(graph: Graph, structure: object, a: Any, b: Any) -> Tracer:
+    """Return the solution of equations of whose matrix SciPy reads the upper half alone."""
+    a = traced(graph, a)
+    if structure in ("pos", "positive definite"):
+        return of_cholesky(graph, cholesky_factor(graph, a), b)
+    if structure not in ("sym", "symmetric", "her", "hermitian"):
+        raise Untraceable(f"equations with a matrix that is {structure}")
+    whole = elementwise(graph, "select", np.tri(len(a), dtype=bool).T, a, a.T)
+    return WRITTEN[np.linalg.solve](graph, whole, b)
+
+
+def _of_finite(written: Any) -> Any:
+    """Return a function that raises an error where not all of its numbers are finite."""
+
+    def function(graph: Graph, *arguments: object, **options: object) -> Any:
+        if options.get("check_finite", True):
+            for value in arguments[:2]:
+                for part in value if isinstance(value, tuple) else (value,):
+                    guard_finite(graph, part, ValueError)
+        return written(graph, *arguments, **options)
+
+    return function
 
 
 def _elementwise(name: str, graph: Graph, x: object) -> Tracer:
@@ -229,13 +260,13 @@ _OF_INTEGRALS = {
     "exprel": _relative_exponential,
     "entr": lambda np, x: np.where(x > 0.0, -x * np.log(np.where(x > 0.0, x, 1.0)),
                                    np.where(x == 0.0, 0.0, np.where(x < 0.0, -math.inf, x))),
-    "log_softmax": lambda np, x, axis=None: x - _kept_logsumexp(np, x, axis),
+    "log_softmax": lambda np, x, axis=None: _log_softmax(np, x, axis),
 }  # fmt: skip
 
 
-def _kept_logsumexp(np: Facade, x: object, axis: object) -> Any:
-    top = np.max(x, axis=axis, keepdims=True)
-    return top + np.log(np.sum(np.exp(x - top), axis=axis, keepdims=True))
+def _log_softmax(np: Facade, x: Any, axis: object) -> Any:
+    below = x - np.max(x, axis=axis, keepdims=True)
+    return below - np.log(np.sum(np.exp(below), axis=axis, keepdims=True))
 
 
 def xlogy(np: Facade, x: Any, y: Any) -> Any:

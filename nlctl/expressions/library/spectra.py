@@ -27,6 +27,13 @@ def _matrix(graph: Graph, a: object) -> Any:
     return array.short()
 
 
+def guard_finite(graph: Graph, numbers: object, error: type[Exception]) -> None:
+    """Note that an error is raised where not all of the numbers are finite."""
+    if isinstance(numbers, list | Tracer):
+        whole = Facade(graph).all(Facade(graph).isfinite(traced(graph, numbers)))
+        graph.guard(traced(graph, whole).only, error)
+
+
 @of(np.linalg.eigvals)
 def eigvals(graph: Graph, a: object) -> Any:
     """Return the eigenvalues of a matrix of two rows, in the order that LAPACK has them."""
@@ -35,6 +42,7 @@ def eigvals(graph: Graph, a: object) -> Any:
         return np.linalg.eigvals(numbers)
     if matrix.shape != (2, 2):
         raise Untraceable("eigenvalues of a matrix of more than two rows")
+    guard_finite(graph, matrix, np.linalg.LinAlgError)
     (p, q), (r, s) = matrix
     half = 0.5 * (p - s)
     square = half * half + q * r
@@ -98,6 +106,7 @@ def matrix_rank(graph: Graph, a: object, tol: object = None, **how: object) -> A
     matrix = _matrix(graph, a)
     if how:
         raise Untraceable("a rank with other arguments")
+    guard_finite(graph, matrix, np.linalg.LinAlgError)
     values = _singular(graph, matrix)
     limit = values[0] * (max(matrix.shape) * np.finfo(float).eps) if tol is None else tol
     return sum_along(graph, Facade(graph).greater(values, limit))

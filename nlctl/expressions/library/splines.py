@@ -80,19 +80,18 @@ def piecewise_polynomial(
     graph: Graph, interpolant: Any, x: Arithmetic, nu: int = 0, extrapolate: Any = None
 ) -> Any:
     """Return SciPy's piecewise polynomial, or a derivative."""
+    extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
     if nu:
         interpolant = interpolant.derivative(nu)
-    extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
     if interpolant.c.dtype != float or extrapolate == "periodic":
         raise Untraceable("a piecewise polynomial with a period, or of complex numbers")
-    if interpolant.c.ndim == 3 and not nu:
+    if interpolant.c.ndim > 2:
         from scipy.interpolate import PPoly
 
-        columns = [PPoly(interpolant.c[:, :, k], interpolant.x, extrapolate=bool(extrapolate))
-                   for k in range(interpolant.c.shape[2])]  # fmt: skip
-        return _in_columns(graph, columns, piecewise_polynomial, x)
-    if interpolant.c.ndim != 2:
-        raise Untraceable("a piecewise polynomial whose values are matrices")
+        shape = interpolant.c.shape[2:]
+        columns = [PPoly(interpolant.c[:, :, *k], interpolant.x, extrapolate=bool(extrapolate))
+                   for k in np.ndindex(shape)]  # fmt: skip
+        return _in_columns(columns, shape, interpolant.axis, piecewise_polynomial, graph, x)
     breaks, coefficients = interpolant.x, interpolant.c
     if breaks.size > MOST_PIECES or np.any(np.diff(breaks) <= 0):
         raise Untraceable("a piecewise polynomial with too many pieces")
@@ -106,12 +105,15 @@ def piecewise_polynomial(
 
 
 def _in_columns(
-    graph: Graph, columns: Sequence[Any], written: Callable[..., Any], x: Arithmetic
-) -> Tracer:
+    columns: Sequence[Any], shape: tuple[int, ...], axis: int, written: Callable[..., Any],
+    graph: Graph, x: Arithmetic,
+) -> Tracer:  # fmt: skip
     """Return several values at each place, by a function of one value for each of them."""
     values = [traced(graph, written(graph, column, x)).short() for column in columns]
     cells = np.stack([v.elements() for v in values], axis=-1)
-    return Tracer(graph, cells)
+    places = range(cells.ndim - 1)  # the axes of x come where that of the samples has been
+    cells = cells.reshape(cells.shape[:-1] + shape)
+    return Tracer(graph, np.moveaxis(cells, places, [axis + k for k in places]))
 
 
 def _beyond(
@@ -133,14 +135,15 @@ def b_spline(graph: Graph, interpolant: Any, x: Any, nu: int = 0, extrapolate: A
     from scipy.interpolate import PPoly
 
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
-    if interpolant.c.ndim == 2 and not nu and extrapolate != "periodic":
+    if extrapolate == "periodic":
+        raise Untraceable("a spline with a period")
+    if interpolant.c.ndim > 1:
         from scipy.interpolate import BSpline
 
-        columns = [BSpline(interpolant.t, c, interpolant.k, bool(extrapolate))
-                   for c in interpolant.c.T]  # fmt: skip
-        return _in_columns(graph, columns, b_spline, x)
-    if interpolant.c.ndim != 1 or extrapolate == "periodic":
-        raise Untraceable("a spline with several values, or with a period")
+        shape, written = interpolant.c.shape[1:], functools.partial(b_spline, nu=nu)
+        columns = [BSpline(interpolant.t, interpolant.c[:, *k], interpolant.k, bool(extrapolate))
+                   for k in np.ndindex(shape)]  # fmt: skip
+        return _in_columns(columns, shape, interpolant.axis, written, graph, x)
     knots = np.unique(interpolant.t[interpolant.k : interpolant.t.size - interpolant.k])
     whole = PPoly.from_spline(interpolant)
     kept = [int(np.searchsorted(whole.x, k, side="right")) - 1 for k in knots[:-1]]
@@ -198,10 +201,11 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
     """Return SciPy's interp1d."""
     kind = getattr(interpolant, "_kind", "")
     values = np.asarray(interpolant.y, dtype=float)
-    if values.ndim == 2 and interpolant.axis in (0, -2):
-        return _in_columns(graph, _of_columns(interpolant, values), table_of_one, x)
-    if values.ndim != 1:
-        raise Untraceable("a table with several values")
+    if values.ndim > 1:
+        axis = interpolant.axis % values.ndim
+        rows = np.moveaxis(values, axis, 0)
+        columns = _of_columns(interpolant, rows.reshape(len(rows), -1))
+        return _in_columns(columns, rows.shape[1:], axis, table_of_one, graph, x)
     if kind in ("linear", "linear-np", "slinear") and not hasattr(interpolant, "_spline"):
         lines = np.stack([np.diff(values) / np.diff(interpolant.x), values[:-1]], axis=1)
         rule = lambda e: interval_polynomial(graph, e, interpolant.x, lines)  # noqa: E731

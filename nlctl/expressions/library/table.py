@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -125,6 +126,15 @@ class Facade:
         if not callable(real):
             return real
         return lambda *arguments, **options: written_out(self.graph, real, *arguments, **options)
+
+
+def on_expressions(graph: Graph, function: FunctionType) -> Any:
+    """Return one of our formulas of numbers, and what it calls, as formulas of expressions."""
+    names = dict(function.__globals__, np=Facade(graph))
+    for name in function.__code__.co_names:
+        if isinstance(names.get(name), FunctionType):
+            names[name] = on_expressions(graph, names[name])
+    return FunctionType(function.__code__, names)
 
 
 def written_out(graph: Graph, function: object, *arguments: object, **options: object) -> Any:

@@ -293,7 +293,8 @@ class Expressions(ast.NodeVisitor):
         for part in node.keys:
             if part is not None:
                 self.visit(part)
-        return holder([self.visit(part) for part in node.values])
+        parts = zip(node.keys, map(self.visit, node.values), strict=True)
+        return holder([element(value) if key is None else value for key, value in parts])
 
     def visit_Starred(self, node: ast.Starred) -> KnownValue:
         value = self.visit(node.value)
@@ -355,7 +356,7 @@ class Expressions(ast.NodeVisitor):
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
         if isinstance(thing, Unknown):
-            return base
+            return replace(base, own=base.own and (base.inside or not base.holds))
         if isinstance(thing, Pure):
             return replace(base, own=base.inside)
         if isinstance(thing, Instance):
@@ -404,7 +405,8 @@ class Expressions(ast.NodeVisitor):
             base = self.visit(node.func.value)
             bound = known_calls.method(self.walk, base, node.func.attr, given)
             if bound is not None:
-                self.kept(base, given.every)
+                if node.func.attr not in known_calls.named.READING:
+                    self.kept(base, given.every)
                 return bound
         function = self.visit(node.func)
         given = made.with_field_names(node, function.known, given)
@@ -424,7 +426,8 @@ class Expressions(ast.NodeVisitor):
         reaches = any(v.holds for v in given.every) or not all(plain)
         if self.walk.keeps > before and reaches:
             self.lists_may_hold_others()
-        if not all(p or isinstance(f.known, Local) for p, f in zip(plain, called, strict=True)):
+        takes = [isinstance(f.known, Local) or f.known in known_calls.TAKING for f in called]
+        if not all(p or t for p, t in zip(plain, takes, strict=True)):
             for value in given.every:  # a list may have been given something to keep
                 self.kept(value, given.every)
         return result

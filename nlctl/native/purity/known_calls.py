@@ -69,6 +69,7 @@ CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | f
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
+TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
 
 
 def call(walk: Walk, thing: object, given: Given) -> KnownValue:
@@ -270,7 +271,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         return forgotten(base)
     if name in named.CHANGING:
         _written(base, f"{name}()")
-        return element(base) if base.holds else FRESH
+        return least_upper_bound([element(base), *given.places[1:2]]) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
     results = made.of_tuples(walk, name, given) if base.own else []
@@ -375,8 +376,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
-        known = places[0].known
-        return OUTSIDE if isinstance(known, Unknown) else captured(type(known))
+        return OUTSIDE if isinstance(places[0].known, Unknown) else captured(type(places[0].known))
     if name in ("min", "max"):
         return least_upper_bound(
             [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
@@ -385,7 +385,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         return holder([walk.call(places[0], Given(tuple(map(element, places[1:]))))])
     if thing in MAKING:
         _call_functions(walk, given.places if by_key else given.every)
-        inside = all(v.inside for v in places)
+        held = holder(element(v) if k == "**" else v for k, v in given.names.items())
+        inside = held.inside and all(v.inside for v in places)
         return KnownValue(True, inside, True, known=rows_of_functions(thing, places))
     if name == "next":
         _written(places[0], "next()")

@@ -22,11 +22,13 @@ from .values import (
     Impure,
     Instance,
     KnownValue,
+    OneOf,
     Parent,
     Pure,
     Unknown,
     captured,
     holder,
+    least_upper_bound,
     library,
 )
 from .walk import Walk
@@ -149,6 +151,8 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
 def replaced_fields(walk: Walk, base: KnownValue, named: Mapping[str, KnownValue]) -> KnownValue:
     """Return what is known of what `dataclasses.replace` makes of an object."""
     thing = base.known
+    if isinstance(thing, OneOf):
+        return least_upper_bound([replaced_fields(walk, c, named) for c in thing.choices])
     known = isinstance(thing, Instance)
     cls = thing.cls if known else type(thing)
     if isinstance(thing, Unknown) or not dataclasses.is_dataclass(cls):

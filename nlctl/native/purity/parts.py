@@ -35,10 +35,15 @@ def part_at(value: KnownValue, i: int, count: int) -> KnownValue:
         column = [row[i] for row in rows]
         if all(isinstance(part, (*PLAIN, np.ndarray)) for part in column):
             return replace(element(value), known=UNKNOWN_VALUE)
-        whole = least_upper_bound([captured(part) for part in column])
-        is_open = isinstance(whole.known, Unknown)
-        return replace(whole, known=choice_among(column)) if is_open else whole
+        return _any_of(column)
     return element(value)
+
+
+def _any_of(parts: Sequence[Any]) -> KnownValue:
+    """Return what is known of one of several things that were there before the call."""
+    whole = least_upper_bound(map(captured, parts))
+    is_open = isinstance(whole.known, Unknown)
+    return replace(whole, known=choice_among(parts)) if is_open else whole
 
 
 def part_of_row(base: KnownValue, key: Any) -> KnownValue:
@@ -57,6 +62,6 @@ def part_of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
         key, inside = keys[0], KnownValue(base.inside, base.inside, True)
         if len(keys) > 1 or not isinstance(key, PLAIN):
             return inside
-        parts = [captured(thing[key]) for thing in known if key in thing]
-        return least_upper_bound(parts) if parts else inside
+        parts = [thing[key] for thing in known if key in thing]
+        return _any_of(parts) if parts else inside
     return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base

@@ -4,6 +4,7 @@ import collections
 import copy
 import functools
 import itertools
+import types
 
 import control as ct
 import numpy as np
@@ -252,10 +253,53 @@ def settings_behind_a_chain(t, x, u, p):
     return -x * SETTINGS["k"]
 
 
+def row_by_name(t, x, u, p):
+    for row in dict([], a=ROWS[0]).values():
+        row[0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def row_as_a_default(t, x, u, p):
+    {}.setdefault("a", ROWS)[0][0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def row_if_there_is_none(t, x, u, p):
+    {}.pop("a", ROWS)[0][0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def row_of_a_namespace(t, x, u, p):
+    held = types.SimpleNamespace(rows=ROWS)
+    held.rows[0] += 1.0
+    return -x * ROWS[0][0]
+
+
+def state_by_name(t, x, u, p):
+    dict([], a=x)["a"][0] = 5.0
+    return -x
+
+
 @pytest.mark.parametrize("update", [
     chained_rows, rows_of_several, pairs_of_rows, row_of_a_copy, settings_behind_a_chain,
+    row_by_name, row_as_a_default, row_if_there_is_none, row_of_a_namespace, state_by_name,
 ])  # fmt: skip
 def test_what_is_handed_on_is_still_somebody_elses(update):
     """They remember how often they were called, in what they did not make."""
     with pytest.raises(CompileError, match=r"did not make|changes an element"):
         nlctl.compile(block(update))
+
+
+def parameters_of_its_own(t, x, u, p):
+    mine = {**SETTINGS, **p}
+    mine["k"] *= 2.0
+    return -x * mine["k"]
+
+
+def test_numbers_among_parameters_are_its_own_and_rows_are_not():
+    """A copy of the dict has the same rows in it."""
+    made = [ct.nlsys(parameters_of_its_own, None, inputs=1, outputs=2, states=2, name="b",
+                     params={"k": k}) for k in (3.0, np.ones(2))]  # fmt: skip
+    assert nlctl.compile(made[0]).dynamics(0.0, [1.0, 2.0], [0.0]) == pytest.approx([-6.0, -12.0])
+    with pytest.raises(CompileError, match="changes an element"):
+        nlctl.compile(made[1])

@@ -10,5 +10,6 @@ for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "element
                "objects", "models", "everyday", "toolbox", "habits", "plants",
                "guarded", "caught", "vehicles", "processes", "laws", "lookups",
                "packages", "iterations", "numbers_of_packages", "sums_and_searches",
-               "chosen_things", "chosen_rows", "other_words", "aliases", "handed_on"):  # fmt: skip
+               "chosen_things", "chosen_rows", "other_words", "aliases", "handed_on",
+               "networks"):  # fmt: skip
     importlib.import_module(f"engineers.{_theme}")

@@ -3,23 +3,27 @@
 A traced function finds these instead of `scipy.optimize`'s.  Where SciPy raises an error, or
 needs more passes than are written out, the result is NaN.
 
-Source: `scipy/optimize/Zeros/brentq.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`.
+Source: `scipy/optimize/Zeros/brentq.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`; of `fsolve`
+J. J. More, B. S. Garbow and K. E. Hillstrom, User Guide for MINPACK-1 (1980), routine HYBRD.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from ..arrays import Special, Tracer, scalar, traced
-from ..graph import Expr, Graph, Untraceable
-from ..operators import elementwise
-from .rotated import in_passes
+from .arrays import Special, Tracer, scalar, traced
+from .derivatives import slope
+from .graph import Untraceable
+from .library.rotated import in_passes
+from .operators import elementwise
 
 _ROUNDING = 1e-15  # relative to the larger of 1 and the root
+_EPS = 2.220446049250313e-16
+_STEP = _EPS**0.5  # of differences, relative to x
 
 
 @functools.cache
@@ -29,7 +33,7 @@ def roots() -> dict[Any, Callable[..., Any]]:
 
     return {
         optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton,
-        optimize.root_scalar: root_scalar,
+        optimize.root_scalar: root_scalar, optimize.fsolve: fsolve, optimize.root: root_by_powell,
     }  # fmt: skip
 
 
@@ -37,8 +41,6 @@ class SlopeOfRoot(Special):
     """Gives a root its slope: that of what is 0 there, not of passes that happen to end early."""
 
     # A search that begins at the root ends at once: what it returns does not move with f.
-    slope: ClassVar[Callable[[Graph, Expr, Expr], Expr]]  # see `derivatives`
-
     def __call__(self, f: Callable[..., Any], root: Any, args: Sequence[Any]) -> Any:
         if not isinstance(root, Tracer) or root.shape or root.only.op == "const":
             return root
@@ -49,9 +51,7 @@ class SlopeOfRoot(Special):
         if value.shape:
             return root
         with in_passes(graph):
-            step = scalar(graph, value.only) / scalar(
-                graph, SlopeOfRoot.slope(graph, value.only, place.only)
-            )
+            step = scalar(graph, value.only) / scalar(graph, slope(graph, value.only, place.only))
             near = _ROUNDING * op("maximum", 1.0, op("absolute", place))
             return op("select", op("le", op("absolute", step), near), place - step, root)
 
@@ -59,11 +59,21 @@ class SlopeOfRoot(Special):
 with_slope = SlopeOfRoot()
 
 
-class Root:
-    """What `scipy.optimize.root_scalar` returns where it has found a root."""
+class Refusal(Special):
+    """Ends a trace with its reason, which errors that a traced function raises do not keep."""
 
-    def __init__(self, root: Any, method: str) -> None:
-        self.root, self.method, self.converged, self.flag = root, method, True, "converged"
+    def __call__(self, reason: str) -> Any:
+        raise Untraceable(reason)
+
+
+refused = Refusal()
+
+
+class Root:
+    """What `root_scalar` and `root` of SciPy return where they have found a root."""
+
+    def __init__(self, **parts: Any) -> None:
+        self.__dict__.update(parts)
 
     def __getattr__(self, name: str) -> Any:
         raise Untraceable(f"{name} of a root: how many passes it has taken")
@@ -82,13 +92,17 @@ def root_scalar(
     if method in ("brentq", "bisect") and bracket is not None:
         named |= {} if xtol is None else {"xtol": xtol}
         search = brentq if method == "brentq" else bisect
-        return Root(search(f, bracket[0], bracket[1], args, **named), method)
+        return _found(search(f, bracket[0], bracket[1], args, **named), method)
     named |= {} if xtol is None else {"tol": xtol}
     if method == "newton" and callable(fprime):
-        return Root(newton(f, x0, fprime, args, **named), method)
+        return _found(newton(f, x0, fprime, args, **named), method)
     if method == "secant":
-        return Root(newton(f, x0, None, args, x1=x1, **named), method)
-    raise Untraceable(f"scipy.optimize.root_scalar by {method or 'differences'}")
+        return _found(newton(f, x0, None, args, x1=x1, **named), method)
+    return refused(f"scipy.optimize.root_scalar by {method or 'differences'}")
+
+
+def _found(root, method):
+    return Root(root=root, method=method, converged=True, flag="converged")
 
 
 def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
@@ -191,4 +205,59 @@ def _secants(func, p0, p1, args, tol, maxiter, rtol):
         p0, q0 = p1, q1
         p1 = p
         q1 = func(p1, *args)
+    raise RuntimeError("Failed to converge")
+
+
+def root_by_powell(fun, x0, args=(), method="hybr", jac=None, tol=None):
+    """Return a root of one function of one number by MINPACK's method, as `fsolve` does."""
+    if method != "hybr" or jac:
+        return refused(f"scipy.optimize.root by {method}, or with derivatives")
+    x = fsolve(fun, x0, args) if tol is None else fsolve(fun, x0, args, xtol=tol)
+    return Root(x=x, success=True, status=1, method=method)
+
+
+def fsolve(func, x0, args=(), fprime=None, full_output=0, *, xtol=1.49012e-8, factor=100):
+    """Return a root of one function of one number, in an array, by Powell's hybrid method."""
+    start = np.reshape(np.multiply(1.0, x0), -1)
+    if fprime is not None or full_output or len(start) > 1:
+        return refused("scipy.optimize.fsolve of several numbers, or with derivatives")
+    args = args if isinstance(args, tuple) else (args,)
+    only = lambda v, *more: np.reshape(func(np.array([v]), *more), -1)[0]  # noqa: E731
+    return np.array([with_slope(only, _by_powell(only, start[0], args, xtol, factor), args)])
+
+
+def _by_powell(f, x, args, xtol, factor):
+    value, renews, is_first, is_stuck = f(x, *args), True, True, False
+    slope, scale, reach, good, bad, slow, slow_anew = [0.0 * x] * 7
+    for _ in range(200):
+        h = _STEP * np.where(x == 0, 1.0, abs(x))
+        measured = (f(x + h, *args) - value) / h
+        slope = np.where(renews, measured, slope)
+        if is_first:
+            scale = np.where(measured == 0, 1.0, abs(measured))
+            reach = np.where(x == 0, factor, factor * abs(scale * x))
+        scale = np.where(renews, np.maximum(scale, abs(measured)), scale)
+        step = -value / np.where(slope == 0, _EPS, slope)
+        length = abs(scale * step)
+        step = np.where(length > reach, np.copysign(reach / scale, step), step)
+        length = np.minimum(length, reach)
+        reach = np.minimum(reach, length) if is_first else reach
+        ahead, model = f(x + step, *args), value + slope * step
+        gain = np.where(abs(ahead) < abs(value), 1 - (ahead / value) ** 2, -1.0)
+        hope = np.where(abs(model) < abs(value), 1 - (model / value) ** 2, 0.0)
+        ratio = np.where(hope > 0, gain / hope, 0.0)
+        fails = ratio < 0.1
+        good, bad = np.where(fails, 0.0, good + 1), np.where(fails, bad + 1, 0.0)
+        longer = np.where((ratio >= 0.5) | (good > 1), np.maximum(reach, 2 * length), reach)
+        longer = np.where(abs(ratio - 1) <= 0.1, 2 * length, longer)
+        reach = np.where(fails, 0.5 * reach, longer)
+        slow = np.where(gain >= 1e-3, 0.0, slow + 1)
+        slow_anew = np.where(gain >= 0.1, 0.0, slow_anew + np.where(renews, 1.0, 0.0))
+        slope = slope + (ahead - model) / step
+        x, value = np.where(ratio >= 1e-4, x + step, x), np.where(ratio >= 1e-4, ahead, value)
+        is_near = (reach <= xtol * abs(scale * x)) | (value == 0)
+        if is_near & np.logical_not(is_stuck):
+            return x
+        is_stuck = is_stuck | (slow >= 10) | (slow_anew >= 5)  # where it stops without a root
+        renews, is_first = bad == 2, False
     raise RuntimeError("Failed to converge")
