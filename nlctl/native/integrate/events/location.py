@@ -230,18 +230,18 @@ def locate_jump(lane, rtol, is_behind):
 
 
 @numba.njit(**INNER)
-def step_accepted(lane, event):
-    """Count an accepted step; after several events without progress those of memories rest."""
+def step_accepted(lane, event, turn):
+    """Count an accepted step; after several turns of memories without progress these rest."""
     lane.accepted += 1
     lane.last = lane.step
     lane.tries = lane.seeks = lane.returns = 0
     lane.quiet = max(0, lane.quiet - 1)
     if not lane.across and lane.cross == 0.0:
         lane.misses = 0
-    if event and lane.across:
-        lane.events += 1
-    elif event:
-        lane.events += 1
-        lane.short = lane.short + 1 if lane.step < SHORT * lane.h else 0
+    lane.events += event
+    if lane.step >= SHORT * lane.h:
+        lane.short = 0
+    elif turn and not lane.across:  # what else is located does not come back by rounding
+        lane.short += 1
         if lane.short >= PATIENCE:
             lane.short, lane.quiet = 0, REST
