@@ -26,7 +26,9 @@ def plays(signal: np.ndarray) -> np.ndarray:
 def exact(times: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Return the memories at the end: a play knows its input's extremes, which are all sampled."""
     peaks = (np.pi * np.arange(100) + np.pi / 2) / OMEGA
-    at = np.unique(np.concatenate([times, peaks[peaks < times[-1]], np.linspace(0, times[-1], 999)]))
+    at = np.unique(
+        np.concatenate([times, peaks[peaks < times[-1]], np.linspace(0, times[-1], 999)])
+    )
     return plays(np.interp(at, times, levels) + SWING * np.sin(OMEGA * at))
 
 
