@@ -47,7 +47,7 @@ def driven() -> object:
 LOOP = driven()
 
 
-@pytest.mark.parametrize("steep", [1e-2, 1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("steep", [1e-2, 1e-5, 1e-9])
 @pytest.mark.parametrize("how", ["tsit5", "rodas5p", "taylor", "auto", "python-control"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_plays_turn_where_their_input_does(how, steep, rtol):
