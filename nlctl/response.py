@@ -270,12 +270,13 @@ def _computed(run: arguments.RunArguments, engine: str) -> Response:
 
 def _sized(run: arguments.RunArguments) -> arguments.RunArguments:
     """Return a run of a block that has the numbers of signals which the run gives it."""
-    if not is_system(run.system):
+    system = run.system
+    if not is_system(system) or None not in (system.nstates, system.ninputs, system.noutputs):
         return run
     from .native.diagram.checks import sized  # late: needs numba
 
     try:
-        system = sized(run.system, run.times, run.inputs, run.initial_state)
+        system = sized(system, run.times, run.inputs, run.initial_state)
     except CompileError:  # its function remembers: no call of it is for nothing
         return run
     return replace(run, system=system)
