@@ -1,5 +1,8 @@
 """What a function may return as rates: python-control takes whatever NumPy makes floats of."""
 
+import subprocess
+import sys
+
 import control as ct
 import numpy as np
 import pandas as pd
@@ -40,3 +43,17 @@ def test_a_forgotten_return_diverges():
     block = ct.nlsys(lambda t, x, u, p: None, None, states=2, inputs=0, outputs=2, name="block")
     with pytest.raises(nlctl.errors.DivergedError, match="'block' diverged"):
         nlctl.input_output_response(block, [0, 1], 0, [1.0, 0.5], engine="python-control")
+
+
+def test_a_block_with_sizes_loads_nothing_of_the_engine():
+    """In discrete time python-control runs it by itself."""
+    script = """
+import sys, control as ct, nlctl
+lag = ct.ss(0.5, 1, 1, 0, dt=1)
+run = nlctl.input_output_response(lag, [0, 1, 2], [1, 1, 1], engine="python-control")
+print(float(run.outputs[-1]), any(name.startswith("nlctl.native") for name in sys.modules))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["1.5", "False"]
