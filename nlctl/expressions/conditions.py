@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable
 from functools import reduce
+from itertools import pairwise
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, deduce, needed, parts_first
@@ -140,6 +141,8 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     """
     if at_integers(condition):
         return _at_even_and_odd(graph, _counted(graph, condition))
+    if (passed := _table_passed(condition)) is not None:
+        return _at_even_and_odd(graph, _place_in(graph, *passed))
     if _asks_for_number(condition):
         return tuple(domain_edges(graph, needed(condition.args)))
     function = switching_function(graph, condition)
@@ -148,6 +151,34 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     nodes = needed(condition.args)
     edges = [*domain_edges(graph, nodes), *poles(graph, nodes)]
     return tuple(part for product in (function, *edges) for part in sign_factors(graph, product))
+
+
+def is_of_places(condition: Expr) -> bool:
+    """Return whether a condition switches at places that are counted: integers, or a table's."""
+    return at_integers(condition) or _table_passed(condition) is not None
+
+
+def _table_passed(condition: Expr) -> tuple[Expr, Expr] | None:
+    """Return a table in increasing order, and the number that it is compared with; None of none."""
+    if condition.op in ORDERS and condition.size is not None:
+        for table, number in (condition.args, condition.args[::-1]):
+            if table.op == "table" and number.size is None:
+                return (table, number) if all(a < b for a, b in pairwise(table.data)) else None
+    return None
+
+
+def _place_in(graph: Graph, table: Expr, number: Expr) -> Expr:
+    """Return the place of a number in a table: k at element k, and straight lines between."""
+    op, size, ends = graph.op, table.size or 1, (table.data[0], table.data[-1])
+    first, last = map(graph.const, ends)
+    widths = [b - a for a, b in pairwise(table.data)]
+    starts = graph.table(table.data[:-1])
+    part = op("div", op("sub", number, starts), graph.table(widths))
+    part = op("minimum", op("maximum", part, graph.const(0.0)), graph.const(1.0))
+    before = op("minimum", op("sub", number, first), graph.const(0.0))
+    behind = op("maximum", op("sub", number, last), graph.const(0.0))
+    beyond = op("div", op("add", before, behind), graph.const(max(widths)))
+    return op("add", graph.sum(part, size - 1), beyond)
 
 
 def _is_product(node: Expr) -> bool:

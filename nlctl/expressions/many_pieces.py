@@ -46,18 +46,8 @@ def of_interval(
     graph: Graph, x: Expr, bounds: np.ndarray, columns: Sequence[np.ndarray]
 ) -> list[Expr]:
     """Return of each column the number of the interval of x: the first below all bounds."""
-    if bounds.size > _MOST_INTERVALS:
-        raise Untraceable("a table with too many places")
-    number, last = scalar(graph, x), float(bounds[-1])
-    table = traced(graph, _checked(bounds))
-    lower = traced(graph, np.concatenate([[-np.inf], bounds[:-1]]))
-    op = lambda name, a, b: elementwise(graph, name, a, b)  # noqa: E731
-    here = op("and", op("ge", number, lower), op("lt", number, table))
-    is_inside = graph.op("lt", x, graph.const(last))
-    return [
-        graph.op("select", is_inside, _holding(graph, here, c[:-1]), graph.const(float(c[-1])))
-        for c in columns
-    ]
+    k = scalar(graph, count_below(graph, "le", bounds, x))
+    return [at_place(graph, k, column) for column in columns]
 
 
 def _checked(values: np.ndarray) -> np.ndarray:

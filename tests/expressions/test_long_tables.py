@@ -128,3 +128,30 @@ def test_what_a_list_holds_is_followed_whatever_it_is():
         for x in (-2.5, -0.5, 0.5, 1.0, 2.2, 7.1):
             expected = block.dynamics(t, [x], [])
             np.testing.assert_allclose(compiled.dynamics(t, [x], []), expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+def test_each_place_that_a_state_passes_is_an_event(method):
+    """A value for each interval of 400 unequal ones, there and back: their sums."""
+    rng = np.random.default_rng(5)
+    places, values = np.sort(rng.uniform(0.0, 1.0, 400)), rng.normal(size=401)
+
+    def update(t, x, u, params):
+        here = values[np.searchsorted(places, x[0])]
+        return [x[1], -x[0], x[1] * here, np.interp(x[0], places, values[1:])]
+
+    block = ct.nlsys(update, None, states=4, inputs=0, outputs=4, name="block")
+    assert "too many" not in str(nlctl.compile(block))
+    run = nlctl.input_output_response(
+        block, [0.0, np.pi / 2, np.pi], 0, [0.0, 1.0, 0.0, 0.0], rtol=1e-9, atol=1e-10,
+        method=method,
+    )  # fmt: skip
+    widths = np.diff(np.concatenate([[0.0], places, [1.0]]))
+    np.testing.assert_allclose(run.states[2, 1], widths @ values, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(run.states[2, 2], 0.0, rtol=0, atol=1e-7)
+    # and of straight lines in x = sin(t): by parts, with sqrt(1 - x^2) and arcsin(x) at the places
+    slopes, angle = np.diff(values[1:]) / np.diff(places), np.arcsin(places)
+    offsets = values[1:-1] - slopes * places[:-1]
+    inner = offsets @ np.diff(angle) - slopes @ np.diff(np.cos(angle))
+    outer = values[1] * angle[0] + values[-1] * (np.pi / 2 - angle[-1])
+    np.testing.assert_allclose(run.states[3, 1], inner + outer, rtol=0, atol=1e-7)

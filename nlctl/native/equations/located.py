@@ -12,8 +12,8 @@ from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends, replaced_parts
 from ...expressions.conditions import (
-    at_integers,
     conditions,
+    is_of_places,
     sign_factors,
     switching_functions,
 )
@@ -270,7 +270,7 @@ def _sharp(
 def _with_sides(graph: Graph, condition: Expr) -> list[tuple[Expr, int]]:
     """Return switching functions, each with what `Located.integers` says of it."""
     functions = switching_functions(graph, condition)
-    sides = (1, -1) if at_integers(condition) else (0,) * len(functions)
+    sides = (1, -1) if is_of_places(condition) else (0,) * len(functions)
     return list(zip(functions, sides, strict=True))
 
 
