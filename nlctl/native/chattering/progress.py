@@ -1,7 +1,7 @@
-"""Whether a lane goes on from switch to switch, as up a staircase, or comes back to one place.
+"""Whether each switch of a lane is at another place, as up a staircase, or comes back to one.
 
 Where it comes back, the straight way from one switch to the next lies next to what is compared,
-and the run has been on one side of it.  Where it goes on, the straight way leads as far from there
+and the run has been on one side of it.  Otherwise the straight way leads as far from there
 as the run does: the next switch of the same condition is another one.
 """
 
