@@ -5,6 +5,9 @@ Two things together tell that from an oscillation:
 * between two switches what is compared changes by no more than some tolerances;
 * each period from switch to switch is shorter than the one before, by more than a switch is
   located to, and at that pace there are too many to come.
+
+Where there have been very many, and the times in which they become twice as fast become shorter as
+well, they have no end, however well they are resolved.
 """
 
 from __future__ import annotations
@@ -14,12 +17,16 @@ from typing import Any
 import numpy as np
 
 from ...accumulation import AT_LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
+from .progress import rows_that_go_on
 from .steps import Attempt, Jump, LaneEquations
 
 _RATE = 1e-3  # of what is compared (1/s): an ideal relay that comes to rest has done so by then
 _MANY = 3e4  # switches, of a sequence of periods as 1 / n, after which it is enough
 _STEPS = 20  # accepted for each event: with more it does not switch all the time
 _MORE = 1e6  # switches to come that are too many
+_VERY_MANY = 30_000  # switches after which their pace alone says that they have no end
+_SPAN = 100  # switches whose time is a period there, so that none alone counts
+_HALVINGS, _SHORTER = 13, 0.9  # of periods, each in so much of the time of the one before
 _RESOLVED = 1e-4  # part of the longest period: shorter ones may be rounding where a run stays
 
 
@@ -29,27 +36,52 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     lane = run.lanes[j]
     if not run.task.taylor.highest and lane["accepted"] > _STEPS * lane["events"]:
         return None  # at once: what usual runs take must not cost them anything
-    t = np.array([a.t[j] for a in attempts])
-    first = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0)  # rejected steps begin where others do
-    points = [(t[i], attempts[i].x[:, j], attempts[i].u[:, j]) for i in first]
-    g = np.array([evaluated.switching(*point) for point in points])
+    way = evaluated.way(attempts)
+    points, g = way.points, way.g
     if not g.shape[1]:
         return None
-    rates = np.array([attempts[i].first[:, j] for i in first])
-    sides = np.sign(g)
-    turns = (sides[1:] * sides[:-1] < 0).sum(axis=0)
-    row = int(turns.argmax())
-    places = 1 + np.flatnonzero(sides[1:, row] * sides[:-1, row] < 0)
+    row = int(np.argmax([way.switches(i).size for i in range(g.shape[1])]))
+    places = way.switches(row)
     if not places.size:
         return None
-    switches = _noted(run, j, row, t[first][places])
-    crowd = crowd_of(switches, row, run.task.times[-1], run.task.rtol, _MORE)
-    if crowd is None or not _is_small(evaluated, points[places[-1]], rates[places[-1]], crowd):
+    place = points[places[-1]]
+    crowd = _finite(run, j, row)
+    if crowd is None:
+        switches = _noted(run, j, row, np.array([points[k][0] for k in places]))
+        crowd = crowd_of(switches, row, run.task.times[-1], run.task.rtol, _MORE)
+        if crowd is None or not _is_small(evaluated, place, way.rates[places[-1]], crowd):
+            return None
+        if not np.abs(g[:, row]).max() <= WITHIN * _tolerance(evaluated, place, row):
+            return None
+    (before, x, _), (after, x_2, u) = points[places[-1] - 1], place
+    return Jump(
+        times=(before, after), before=x, after=x_2, inputs=u, crowd=crowd,
+        goes_on=bool(rows_that_go_on(evaluated, way)[row]),
+    )  # fmt: skip
+
+
+def _come_to_an_end(times: np.ndarray) -> bool:
+    """Whether switches at some times accumulate before a time, as jumps do, see `jumps_end`."""
+    # Backwards from the last: how long ago so many took twice as long, four times as long, ...
+    periods, halvings = times[_SPAN:] - times[:-_SPAN], np.arange(1, _HALVINGS + 2)
+    longer = np.maximum.accumulate(periods[::-1]) >= 2.0 ** halvings[:, None] * periods[-1]
+    if not longer[-1, -1] or not periods[-1] > 0.0:
+        return False
+    took = np.diff(times[-1 - longer.argmax(axis=1)][::-1])
+    return bool(np.all(took[1:] < _SHORTER * took[:-1]))
+
+
+def _finite(run: Any, j: int, row: int) -> Crowd | None:
+    """Return how very many switches of a condition have come ever faster, to before a time."""
+    rows, times = _log(run, j)
+    own = times[rows == row]
+    if own.size < _VERY_MANY or not _come_to_an_end(own):
         return None
-    if not np.abs(g[:, row]).max() <= WITHIN * _tolerance(evaluated, points[places[-1]], row):
-        return None
-    (before, x, _), (after, x_2, u) = points[places[-1] - 1], points[places[-1]]
-    return Jump(times=(float(before), float(after)), before=x, after=x_2, inputs=u, crowd=crowd)
+    period, before = own[-1] - own[-3], own[-3] - own[-5]
+    return Crowd(
+        row=row, last=float(own[-1]), period=float(period), ratio=float(period / before),
+        more=np.inf,
+    )  # fmt: skip
 
 
 def accumulated(run: Any, j: int, end: float) -> Crowd | None:

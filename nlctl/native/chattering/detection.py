@@ -1,12 +1,13 @@
 """Whether a run chatters: its right-hand side jumps, and its steps do not come away from the jump.
 
 Where the solutions on both sides of a jump lead back to it, there is no step that error control
-accepts and that leaves it: a run makes ever more of the shortest steps.  Three things together
+accepts and that leaves it: a run makes ever more of the shortest steps.  Four things together
 tell that from stiffness and from fast oscillations:
 
 * by what it moves in a mean step, a state changes by no more than some tolerances: the next step of
   a staircase is farther away;
-* of the last steps tried many contain a jump, of the right-hand side or of what a memory becomes;
+* of the last steps tried many contain a jump, of the right-hand side or of what a memory becomes,
+  to which the run comes back, see `progress`;
 * halving the way across, down to neighbouring numbers, does not make it smaller, and next to it on
   both sides there is none, as there is with rounding;
 * it depends on the state: a run does not come back to what jumps with time alone.
@@ -33,6 +34,7 @@ from ...reference.rough import MOST_STEPS, next_to, rough_state
 from ..integrate.state import METHOD, RUNNING
 from ..integrate.workspace import Task, Work
 from .accumulation import accumulated, accumulating
+from .progress import goes_on_at, rows_that_go_on
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
 WINDOW = 1800  # steps tried, at least
@@ -154,10 +156,13 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
     least = np.append(
         _LEAST * extent, np.full(task.rows.memory.size, 1e3 * (task.atol + task.rtol))
     )
+    goes_on = rows_that_go_on(evaluated, evaluated.way(attempts))
     found, last = 0, None
     for attempt in free:
         jump = evaluated.jump(attempt, weights, least)
-        found, last = found + (jump is not None), last or jump
+        if jump is None or goes_on_at(evaluated, goes_on, jump):
+            continue
+        found, last = found + 1, last or jump
         if found == _JUMPS:
             return last
     return None

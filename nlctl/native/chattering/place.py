@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...accumulation import SECOND_ORDER, accumulation_words
+from ...accumulation import EVER_FASTER, SECOND_ORDER, accumulation_words
 from ...diagrams import overridden
 from ...reference.rough import ROUGH
 from ...upstream.control_internals import rates_now
@@ -36,6 +36,8 @@ def chattering_words(
         row = jump.crowd.row
         which = labels[row] if row < len(labels) else ("", "a condition")
         why = "and what is compared is within tolerances of 0"
+        if jump.goes_on:
+            return accumulation_words(which, jump.crowd, "each at another place", EVER_FASTER)
         return accumulation_words(which, jump.crowd, why)
     if jump.is_rough:
         return f"{_changed(compiled, p, params, jump)} {ROUGH}"

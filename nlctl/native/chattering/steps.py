@@ -21,6 +21,7 @@ class Jump:
     after: np.ndarray
     inputs: np.ndarray  # inputs of the program there
     crowd: Crowd | None = None  # how the switches accumulate, if they do
+    goes_on: bool = False  # whether each is at another place, see `progress`
     is_rough: bool = False  # whether it jumps with any rounding of the state, see `reference.rough`
 
     @property
@@ -50,6 +51,21 @@ class Attempt:
     free: np.ndarray  # whether it did not get to a stop that was known before the run
 
 
+@dataclass(frozen=True, kw_only=True)
+class Way:
+    """Where a lane has been at the beginnings of the steps that it has made."""
+
+    points: list[tuple[float, np.ndarray, np.ndarray]]  # times, states and inputs
+    rates: np.ndarray  # (points, nstates)
+    g: np.ndarray  # (points, rows): switching functions and conditions
+
+    def switches(self, row: int) -> np.ndarray:
+        """Return the points before which a condition has changed its sign."""
+        sides = np.sign(self.g[:, row])
+        beside = np.flatnonzero(sides)  # a step may end where it is exactly 0
+        return beside[1:][sides[beside[1:]] * sides[beside[:-1]] < 0]
+
+
 def parameters_of(run: Any, j: int) -> np.ndarray:
     """Return the parameters of lane `j`, in every lane."""
     return np.ascontiguousarray(np.repeat(run.task.p[:, j : j + 1], run.machine.width, axis=1))
@@ -70,6 +86,15 @@ class LaneEquations:
     def switching(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the switching functions and conditions, also those that another method finds."""
         return self._at(t, x, u)[1][: self.run.task.rows.guarded]
+
+    def way(self, attempts: list[Attempt]) -> Way:
+        """Return where the steps begin that the lane has tried."""
+        # Rejected ones begin where others do.
+        times = np.array([a.t[self.j] for a in attempts])
+        made = [attempts[i] for i in np.flatnonzero(np.diff(times, prepend=-np.inf) > 0)]
+        points = [(float(a.t[self.j]), a.x[:, self.j], a.u[:, self.j]) for a in made]
+        g = np.array([self.switching(*point) for point in points])
+        return Way(points=points, rates=np.array([a.first[:, self.j] for a in made]), g=g)
 
     def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
         machine = self.run.machine

@@ -87,3 +87,28 @@ def test_their_derivatives_are_those_of_the_extremes(parameter):
 
     differences = (moved(1e-4).outputs - moved(-1e-4).outputs) / 2e-4
     np.testing.assert_allclose(np.ravel(run["y", parameter]), np.ravel(differences), atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+@pytest.mark.parametrize("later", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_plays_whose_inputs_turn_right_after_one_another(later, method):
+    """sin(t - k later), in 16 turns each: all of them are seen, however close the next one is."""
+    end, late, half_gap = 50.0, later * np.arange(6), 0.25
+    drive = ct.nlsys(
+        lambda t, x, u, p: [1.0], lambda t, x, u, p: np.sin(x[0] - later * np.arange(6)),
+        inputs=0, outputs=6, states=["now"], name="drive",
+    )  # fmt: skip
+    spec = nlctl.actuators.PrandtlIshlinskii(r=(half_gap,), w=(1.0,))
+    many = [nlctl.block(spec, f"play{k}") for k in range(6)]
+    loop = ct.interconnect(
+        [drive, *many], inplist=[], outlist=[f"play{k}.v" for k in range(6)],
+        connections=[[f"play{k}.u", f"drive.y[{k}]"] for k in range(6)],
+    )  # fmt: skip
+    made = nlctl.input_output_response(loop, [0.0, end], 0, 0, rtol=1e-6, method=method)
+    turns = np.pi * np.arange(16) + np.pi / 2
+    for k, shift in enumerate(late):
+        memory = 0.0
+        for u in np.sin(np.array([shift, *(turns + shift), end]) - shift):
+            memory = np.clip(memory, u - half_gap, u + half_gap)
+        row = list(made.state_labels).index(f"play{k}_memory[0]")
+        assert made.states[row, -1] == pytest.approx(memory, abs=1e-8)

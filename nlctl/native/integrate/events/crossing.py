@@ -155,7 +155,8 @@ def _across(task, lane, w, j):
             if not (kink and abs(w.events.g[i, j]) <= SMALL_KINK * task.atol):
                 lane.misses = 0
                 return EVENT
-    lane.misses += 1
+    if lane.right_high or not task.taylor.highest:  # else a polynomial was not followed to there
+        lane.misses += 1
     return CLEAR
 
 
