@@ -78,6 +78,7 @@ def svd(
 
 
 def _singular(graph: Graph, matrix: Tracer) -> Tracer:
+    guard_finite(graph, matrix, np.linalg.LinAlgError)
     if matrix.shape != (2, 2):
         return singular_by_rotations(graph, matrix)
     ((p, q), (r, s)), np_ = matrix, Facade(graph)
@@ -106,7 +107,6 @@ def matrix_rank(graph: Graph, a: object, tol: object = None, **how: object) -> A
     matrix = _matrix(graph, a)
     if how:
         raise Untraceable("a rank with other arguments")
-    guard_finite(graph, matrix, np.linalg.LinAlgError)
     values = _singular(graph, matrix)
     limit = values[0] * (max(matrix.shape) * np.finfo(float).eps) if tol is None else tol
     return sum_along(graph, Facade(graph).greater(values, limit))
@@ -117,6 +117,8 @@ def eigvalsh(graph: Graph, a: object, UPLO: str = "L") -> Tracer:
     """Return the eigenvalues of a symmetric matrix; NumPy reads its lower half."""
     matrix, np_ = _matrix(graph, a), Facade(graph)
     matrix = matrix if UPLO == "L" else matrix.T
+    lower = [matrix[i, j] for i in range(len(matrix)) for j in range(i + 1)]
+    guard_finite(graph, lower, np.linalg.LinAlgError)
     if len(matrix) == 1:
         return matrix[0]
     if matrix.shape != (2, 2):
@@ -157,6 +159,7 @@ def pinv(graph: Graph, a: object, rcond: float = 1e-15) -> Any:
     matrix = _matrix(graph, a)
     if isinstance(numbers := constant_value(matrix), np.ndarray):
         return traced(graph, np.linalg.pinv(numbers, rcond))
+    guard_finite(graph, matrix, np.linalg.LinAlgError)
     wide = matrix.shape[0] < matrix.shape[1]
     columns = list(matrix if wide else matrix.T)
     if len(columns) > 2:

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..arrays import Tracer, mapped, traced
 from ..graph import Expr, Graph, Untraceable
-from .table import of
+from ..operators import elementwise
+from .table import known_numbers, of
 
 __all__: list[str] = []
 
@@ -75,8 +76,15 @@ def interp(
     """Return a piecewise linear function, its ends beyond the table."""
     places = _constants(graph, xp, "places of a table")
     values = [graph.number(e) for e in traced(graph, fp).elements()]
-    if period is not None or places.size != len(values) or np.any(np.diff(places) <= 0):
-        raise Untraceable("a table with a period, or whose places do not increase")
+    if period is not None and places.size == len(values):
+        turn = abs(float(known_numbers(period, "periods")))
+        x, places, left, right = elementwise(graph, "remainder", x, turn), places % turn, None, None
+        order = np.argsort(places)
+        places, values = places[order], [values[k] for k in order]
+        places = np.concatenate([places[-1:] - turn, places, places[:1] + turn])
+        values = [values[-1], *values, values[0]]
+    if places.size != len(values) or np.any(np.diff(places) <= 0):
+        raise Untraceable("a table whose places do not increase")
     ends = [v if e is None else traced(graph, e).only for e, v in
             ((left, values[0]), (right, values[-1]))]  # fmt: skip
     array = traced(graph, x)

@@ -428,8 +428,8 @@ class Expressions(ast.NodeVisitor):
             self.lists_may_hold_others()
         takes = [isinstance(f.known, Local) or f.known in known_calls.TAKING for f in called]
         if not all(p or t for p, t in zip(plain, takes, strict=True)):
-            for value in given.every:  # a list may have been given something to keep
-                self.kept(value, given.every)
+            for value in given.every:  # a list may have been given something else to keep
+                self.kept(value, [v for v in given.every if v is not value])
         return result
 
     def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
