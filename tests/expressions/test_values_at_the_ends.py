@@ -91,7 +91,7 @@ def _tall(x):
 
 
 def _compared(function, states, points):
-    """Assert that a traced function gives python-control's values, or NaN where that is an error."""
+    """Assert that a traced function gives what Python does, or NaN where that is an error."""
     rest = np.zeros(states - 1)
     system = ct.nlsys(lambda t, x, u, p: np.append(function(x), rest), None,
                       states=states, inputs=1, outputs=states)  # fmt: skip

@@ -129,15 +129,19 @@ Special.of_complex = staticmethod(paired)
 def _plus(graph: Graph, a: Tracer, b: Tracer) -> Tracer:
     """a + b with the sign of a zero, at which angles and roots jump: 0.0 changes that of -0.0."""
     for one, other in ((a, b), (b, a)):
-        if all(e.op == "const" for e in other.values.flat):
+        if _has_zeros(other):
             return elementwise(graph, "sub", one, elementwise(graph, "neg", other))
     return a + b
 
 
 def _minus(graph: Graph, a: Tracer, b: Tracer) -> Tracer:
     """a - b with the sign of a zero."""
-    is_const = all(e.op == "const" for e in a.values.flat)
-    return _plus(graph, elementwise(graph, "neg", b), a) if is_const else a - b
+    return _plus(graph, elementwise(graph, "neg", b), a) if _has_zeros(a) else a - b
+
+
+def _has_zeros(array: Tracer) -> bool:
+    elements = list(array.values.flat)
+    return all(e.op == "const" for e in elements) and any(e.data == 0.0 for e in elements)
 
 
 def _mul(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:

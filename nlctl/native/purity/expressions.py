@@ -491,7 +491,7 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     missing = object()
     member = inspect.getattr_static(thing, name, missing)
     if member is missing:
-        return not hasattr(type(thing), "__getattr__")
+        return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
     simple = (FunctionType, staticmethod, classmethod)
     return (
         isinstance(member, simple)
