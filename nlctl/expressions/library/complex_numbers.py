@@ -13,7 +13,6 @@ from .. import arrays
 from ..arrays import Computed, Special, Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
-from .rotated import in_passes
 from .table import enter
 
 
@@ -168,23 +167,12 @@ def _sqrt(graph: Graph, z: ComplexPair) -> ComplexPair:
 
 
 def _div(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:
-    """By the larger part of the divisor, as NumPy and Python do, so that nothing overflows."""
-    op = functools.partial(elementwise, graph)
-    if all(e.op == "const" and not e.data for e in b.imag.values.flat):
+    """By the size of the divisor, whose square may be too large or too small."""
+    if _has_zeros(b.imag) and not any(e.data for e in b.imag.values.flat):
         return ComplexPair(graph, a.real / b.real, a.imag / b.real)
-    with in_passes(graph):
-        is_flat = op("ge", op("absolute", b.real), op("absolute", b.imag))
-        (p, q), (large, small) = (
-            (op("select", is_flat, z.real, z.imag), op("select", is_flat, z.imag, z.real))
-            for z in (a, b)
-        )
-        is_zero = op("eq", large, 0.0)
-        ratio = small / op("select", is_zero, 1.0, large)
-        size = op("select", is_zero, op("absolute", large), large + small * ratio)
-        turned = (q - p * ratio) / size
-        return ComplexPair(
-            graph, (p + q * ratio) / size, op("select", is_flat, turned, op("neg", turned))
-        )
+    size = _absolute(graph, b)
+    top = _mul(graph, a, ComplexPair(graph, b.real / size, b.imag / size).conjugate())
+    return ComplexPair(graph, top.real / size, top.imag / size)
 
 
 def _exp(graph: Graph, z: ComplexPair) -> ComplexPair:

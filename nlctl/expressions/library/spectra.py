@@ -14,7 +14,7 @@ from .complex_numbers import ComplexPair
 from .linear_algebra import NotComputed
 from .orthogonal import pseudoinverse, qr
 from .reductions import sum_along
-from .rotated import singular_by_rotations, symmetric_by_rotations
+from .rotated import in_passes, singular_by_rotations, symmetric_by_rotations
 from .table import Facade, constant_value, of
 
 __all__: list[str] = []
@@ -82,8 +82,9 @@ def _singular(graph: Graph, matrix: Tracer) -> Tracer:
     if matrix.shape != (2, 2):
         return singular_by_rotations(graph, matrix)
     ((p, q), (r, s)), np_ = matrix, Facade(graph)
-    one, other = np_.hypot(p + s, r - q) * 0.5, np_.hypot(p - s, r + q) * 0.5
-    return traced(graph, [one + other, np_.abs(one - other)])
+    largest = np_.hypot(p + s, r - q) * 0.5 + np_.hypot(p - s, r + q) * 0.5
+    size = np_.where(largest == 0.0, 1.0, largest)
+    return traced(graph, [largest, np_.abs(p / size * s - q / size * r)])
 
 
 @of(np.linalg.cond)
@@ -124,8 +125,14 @@ def eigvalsh(graph: Graph, a: object, UPLO: str = "L") -> Tracer:
     if matrix.shape != (2, 2):
         return symmetric_by_rotations(graph, matrix)
     (p, _), (q, r) = matrix
-    middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
-    return traced(graph, [middle - spread, middle + spread])
+    with in_passes(graph):
+        middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
+        is_left = middle < 0.0
+        far = np_.where(is_left, middle - spread, middle + spread)  # nothing cancels
+        size = np_.where(far == 0.0, 1.0, far)
+        near = p / size * r - q / size * q
+        ends = [np_.where(is_left, far, near), np_.where(is_left, near, far)]
+    return traced(graph, ends)
 
 
 @of(np.linalg.eigh)
