@@ -9,12 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
+from .arrays import (
+    Tracer,
+    as_array,
+    concatenated,
+    full,
+    full_index,
+    holds_arrays,
+    mapped,
+    python_number,
+    traced,
+)
+from .constants import constant_value
 from .graph import Graph, Untraceable
+from .many_pieces import at_place
 from .masked import Masked, MaskedPlaces
-from .operators import elementwise, integer_range, mapped_cells
+from .operators import elementwise, integer_followed, integer_range, mapped_cells
 
 GATHERED = 64  # places among which an integer may choose
+_EXACT = 2.0**53  # below it integers are floats
 
 
 def _item(self: Tracer, key: Any) -> Any:
@@ -87,8 +100,8 @@ def _candidates(self: Tracer, key: Any, place: int) -> tuple[Tracer, range]:
     chosen, length = keys[place], self.shape[place]
     low, high = integer_range(chosen.only)
     first, last = max(low, -length), min(high, length - 1)
-    if last - first >= GATHERED or first > last:
-        raise Untraceable("an integer that may name too many places")
+    if first > last:
+        raise Untraceable("an integer that names no place")
     guard(self.graph, chosen, "ge", first, low)
     guard(self.graph, chosen, "le", last, high)
     return chosen, range(int(first), int(last) + 1)
@@ -102,6 +115,8 @@ def guard(graph: Graph, chosen: Tracer, name: str, bound: float, possible: float
 
 def _gathered(self: Tracer, key: object, place: int) -> Any:
     chosen, places = _candidates(self, key, place)
+    if len(places) > GATHERED:
+        return _looked_up(self, key, place, chosen)
     choice = _item(self, _with(key, place, places[-1]))
     for k in reversed(places[:-1]):
         here = elementwise(self.graph, "eq", chosen, k)
@@ -109,8 +124,52 @@ def _gathered(self: Tracer, key: object, place: int) -> Any:
     return choice
 
 
+def _looked_up(self: Tracer, key: object, place: int, chosen: Tracer) -> Any:
+    """Return the item at a place of a long table of numbers."""
+    numbers = constant_value(_item(self, _with(key, place, slice(None))))
+    if isinstance(numbers, Tracer) or numbers.dtype == bool:
+        raise Untraceable("an integer that may name too many places")
+    axis = sum(not isinstance(k, int) for k in key[:place]) if isinstance(key, tuple) else 0
+    rows, graph = np.moveaxis(numbers, axis, -1), self.graph
+    k = elementwise(graph, "select", elementwise(graph, "lt", chosen, 0),
+                    elementwise(graph, "add", chosen, rows.shape[-1]), chosen)  # fmt: skip
+    cells = np.empty(rows.shape[:-1], dtype=object)
+    for index in np.ndindex(cells.shape):
+        cells[index] = at_place(graph, k, rows[index])
+    return Tracer(graph, cells)
+
+
+def item_at(graph: Graph, whole: Any, key: object) -> Any:
+    """Return what Python finds at a key; of numbers, and NumPy's, what expressions choose."""
+    keys = key if isinstance(key, tuple) else (key,)
+    if not any(isinstance(k, Tracer) for k in keys):
+        return whole[key]
+    if type(whole) in (list, tuple):
+        return _of_list(graph, whole, key)
+    return (traced(graph, whole) if type(whole) is np.ndarray else whole)[key]
+
+
+def _of_list(graph: Graph, whole: Any, key: Any) -> Any:
+    """Return an element of a list: a choice of numbers of one type, or the way of each element."""
+    types = {v.only.kind if isinstance(v, Tracer) and not v.shape else type(v) for v in whole}
+    if types <= {"f", float}:
+        return traced(graph, whole)[key]
+    if types in ({int}, {np.float64}) and max(map(abs, whole)) < _EXACT:
+        element = traced(graph, np.array(whole))[key]
+        return python_number(graph, element.only) if types == {int} else element
+    if not isinstance(key, Tracer) or _open_place(key) is None:
+        return whole[key]
+    low, high = integer_range(key.only)
+    first, last = -len(whole) if low < 0 else 0, len(whole) - 1
+    guard(graph, key, "ge", first, low)
+    guard(graph, key, "le", last, high)
+    return whole[integer_followed(key, first, last)]
+
+
 def _scattered(self: Tracer, key: object, place: int, value: object) -> None:
     chosen, places = _candidates(self, key, place)
+    if len(places) > GATHERED:
+        raise Untraceable("an integer that may name too many places")
     for k in places:
         here = elementwise(self.graph, "eq", chosen, k)
         at = _with(key, place, k)

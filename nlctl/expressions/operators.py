@@ -242,8 +242,9 @@ def _without_offset(number: Expr) -> tuple[Expr, int]:
     return number, more
 
 
-def _integer(self: Tracer) -> int:
+def integer_followed(self: Tracer, least: float = -np.inf, most: float = np.inf) -> int:
     """Return an integer; one that the state decides is followed to each of its values."""
+    # of which none is below `least` or above `most`
     if not _is_integer(self):
         raise Untraceable("an integer that depends on the state")
     if self.only.value is not None:
@@ -253,6 +254,8 @@ def _integer(self: Tracer) -> int:
     if number.op == "select" and number.args[2].data == NO_INTEGER:
         number, beyond = number.args[1], [int(NO_INTEGER)]  # of NaN, what NumPy makes of it
     low, high = integer_range(number)
+    if least > -np.inf:
+        low, high, beyond = max(low, least - more), min(high, most - more), []
     if high - low >= _FOLLOWED:
         raise Untraceable("an integer that may have too many values")
     values = [*range(int(low), int(high) + 1), *beyond]
@@ -266,14 +269,14 @@ def _hash(self: Tracer) -> int:
     """Return the hash of a constant, or of the value of an integer that is followed."""
     if not self.shape and self.only.op == "const":
         return hash(self.only.data)
-    return hash(_integer(self))
+    return hash(integer_followed(self))
 
 
 def _floor_division(self: Tracer, other: object) -> Any:
     if self.graph.attempts:
         _ask_divisor(self.graph, self, other)
     if _is_integer(self) and self.only.value is not None and isinstance(other, int):
-        return operator.floordiv(_integer(self), other)
+        return operator.floordiv(integer_followed(self), other)
     return floor_quotient(self.graph, self, other)
 
 
@@ -329,7 +332,7 @@ def moved_bits(graph: Graph, number: object, places: object, way: int) -> Tracer
     array, by = traced(graph, number), traced(graph, places)
     if by.shape or by.only.kind != "i":
         raise Untraceable("a shift by something else than one integer")
-    count = _integer(by)
+    count = integer_followed(by)
     if count < 0:
         raise ValueError("negative shift count")
     return mapped_cells(array, lambda e: shifted(graph, e, way * count))
@@ -343,7 +346,7 @@ def _power(base: Any, exponent: Any) -> Any:
     """Return a power: with a whole exponent, known or assumed, as products."""
     base, exponent = (v.there() if isinstance(v, Tracer) else v for v in (base, exponent))
     if _is_integer(exponent) and exponent.only.value is not None:
-        exponent = _integer(exponent)
+        exponent = integer_followed(exponent)
     if isinstance(exponent, float) and exponent.is_integer():
         exponent = int(exponent)
     if isinstance(exponent, Tracer):
@@ -468,8 +471,8 @@ for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
 for _name, _method in {
     "invert": _invert,
     "bool": _truth,
-    "index": _integer,
-    "int": _integer,
+    "index": integer_followed,
+    "int": integer_followed,
     "pow": _power,
     "rpow": lambda self, other: _power(other, self),
     "hash": _hash,

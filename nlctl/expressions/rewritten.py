@@ -18,10 +18,9 @@ from collections.abc import Callable, Mapping, Set
 from types import CodeType, FunctionType
 from typing import Any
 
-import numpy as np
-
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
+from .indexing import item_at
 from .iterated import NOT_RETURNED, Loop, PassWriter
 from .library.ordered import sorted_list
 from .library.table import unwrapped
@@ -49,20 +48,20 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
     except Unreadable:
         return function.__code__
     kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
-    if "__class__" in function.__code__.co_freevars or not isinstance(tree, ast.FunctionDef):
+    if "__class__" in function.__code__.co_freevars:
         _check_as_it_is(tree, kinds, merging)
         return function.__code__  # (only within a class is ``__class__`` what it is)
     if not kinds:
         return function.__code__
-    body = _Rewriter(function.__globals__).visit(copy.deepcopy(tree))
+    body = _Rewriter(function.__globals__).visit(_as_statements(copy.deepcopy(tree)))
     body = Merger().visit(PassWriter().visit(body)) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
 
 
 def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
-    """Check that a lambda, or a method that calls super(), has nothing to rewrite."""
-    where = "a lambda" if isinstance(tree, ast.Lambda) else "a method that calls super()"
+    """Check that a method that calls super() has nothing to rewrite."""
+    where = "a method that calls super()"
     if ast.Try in kinds:
         raise Untraceable(f"try in {where}")
     compared = [n for n in ast.walk(tree) if isinstance(n, ast.Compare)]
@@ -72,6 +71,15 @@ def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
     is_asked = bool(asked) and (merging or any(other is not None for other in others))
     if is_asked or kinds & {ast.MatchSingleton, ast.MatchClass}:
         raise Untraceable(f"identity or a class in a pattern in {where}")
+
+
+def _as_statements(tree: Definition) -> ast.FunctionDef:
+    """Return a definition in statements: of a lambda that of a function which returns the same."""
+    if isinstance(tree, ast.FunctionDef):
+        return tree
+    body: list[ast.stmt] = [ast.copy_location(ast.Return(tree.body), tree.body)]
+    whole = ast.FunctionDef(_FOLLOWED, tree.args, body, [])
+    return ast.copy_location(whole, tree)
 
 
 _FOLLOWED = "followed_function"
@@ -153,7 +161,7 @@ class _Rewriter(ast.NodeTransformer):
     def visit_Subscript(self, node: ast.Subscript) -> Any:
         self.generic_visit(node)
         keys = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        names = any(isinstance(k, ast.Name | ast.Call | ast.BinOp | ast.Subscript) for k in keys)
+        names = not all(isinstance(k, ast.Constant | ast.Slice) for k in keys)
         if not (names and isinstance(node.ctx, ast.Load)):
             return node
         return call_instead("item", node.value, _key(node.slice))
@@ -282,7 +290,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("numbered"): NumberKeys,
         INSTEAD_NAME.format("attempt"): functools.partial(_Attempt, graph),
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
-        INSTEAD_NAME.format("item"): functools.partial(_item, graph),
+        INSTEAD_NAME.format("item"): functools.partial(item_at, graph),
         INSTEAD_NAME.format("slice"): slice,
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
         INSTEAD_NAME.format("same"): lambda a, b: _behind(a) is _behind(b),
@@ -361,24 +369,9 @@ def is_raised(error: BaseException) -> bool:
         return False
     code = place.tb_frame.f_code
     is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
-    is_staged |= code in (_item.__code__, NumberKeys.__getitem__.__code__)
+    is_staged |= code in (item_at.__code__, NumberKeys.__getitem__.__code__)
     raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
     return is_staged and (raises or isinstance(error, _PYTHONS) or "NoneType" in str(error))
-
-
-def _item(graph: Graph, whole: Any, key: object) -> Any:
-    """Return what Python finds at a key; of NumPy's integers what expressions choose."""
-    keys = key if isinstance(key, tuple) else (key,)
-    if not any(isinstance(k, Tracer) for k in keys):
-        return whole[key]
-    of_floats = type(whole) in (list, tuple) and all(map(_is_float, whole))
-    return (traced(graph, whole) if of_floats or type(whole) is np.ndarray else whole)[key]
-
-
-def _is_float(value: object) -> bool:
-    if isinstance(value, Tracer):
-        return not value.shape and value.only.kind == "f"
-    return type(value) is float
 
 
 def _index(whole: Any, value: Any) -> Any:

@@ -220,9 +220,8 @@ HEIR = Heir()
 
 @pytest.mark.parametrize("above", [0.0, 3.0])
 def test_what_cannot_be_asked_on_expressions_is_called(above):
-    """Words that stay as they are: of a lambda, of a method that calls super()."""
+    """Words that stay as they are, of a method that calls super(), and the class of an object."""
     for source in (
-        lambda t, x, u, params: [1.0 if (float(x[0]) > 1.0) is True else 2.0],
         lambda t, x, u, params: [HEIR.value(x[0], float(x[0]) > 1.0)],
         lambda t, x, u, params: [1.0 if type(HEIR) is Heir else x[0]],
     ):
@@ -230,6 +229,23 @@ def test_what_cannot_be_asked_on_expressions_is_called(above):
         compiled = nlctl.compile(system)
         assert compiled.equations.calls
         assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+
+
+@pytest.mark.parametrize("above", [0.0, 3.0])
+def test_a_lambda_is_in_the_words_of_a_function(above):
+    """Identity, choices, and what stands at a place that is computed."""
+    rows = [[1, 2.0], [3, 4.0]]
+    for source in (
+        lambda t, x, u, params: [1.0 if (float(x[0]) > 1.0) is True else 2.0],
+        lambda t, x, u, params, *, k=2.0: [
+            (y := k * x[0]) + rows[int(y > 1)][0] * (lambda z: z)(y)
+        ],
+        lambda t, x, u, params: [{0: 5.0, 1: 7.0}[int(x[0] > 1.0)] if x[0] is not None else 0.0],
+    ):
+        system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
+        compiled = nlctl.compile(system)
+        assert compiled.dynamics(0.0, [above], [0.0]) == system.dynamics(0.0, [above], [0.0])
+        assert not compiled.equations.calls
 
 
 @pytest.mark.parametrize("above", [0.0, 3.0])

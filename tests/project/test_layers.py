@@ -86,7 +86,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["integers", "gains", "passes"],
-        ["arrays", "promoted", "operators", "masked", "indexing", "edges"],
+        ["arrays", "promoted", "operators", "masked", "many_pieces", "edges"],
         ["sharp", "without_poles", "decimals"],
         ["levels"],
         [
@@ -97,6 +97,8 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
             "latex",
             "quotients",
         ],
+        ["constants"],
+        ["indexing"],
         ["bends"],
         ["library"],
         ["derivatives"],

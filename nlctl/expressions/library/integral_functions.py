@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, scalar, traced
+from ..constants import constant_value
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
-from .table import Facade, constant_value
+from .table import Facade
 
 __all__: list[str] = []
 

@@ -11,12 +11,13 @@ import numpy as np
 
 from ..arithmetic import Arithmetic
 from ..arrays import Special, Tracer, as_array, scalar, traced
+from ..constants import constant_value
 from ..elimination import eliminated, is_zero, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
 from .complex_numbers import ComplexPair, holds_complex, paired
-from .table import WRITTEN, Facade, constant_value, of
+from .table import WRITTEN, Facade, of
 
 __all__: list[str] = []
 

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, traced
+from ..constants import constant_value
 from ..graph import Graph, Untraceable
 from .linear_algebra import solved
-from .table import Facade, constant_value
+from .table import Facade
 
 __all__: list[str] = []
 

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, as_array, traced
+from ..constants import constant_value
 from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, total, with_counts
 from .complex_numbers import ComplexPair
-from .table import ARRAY_METHODS, WRITTEN, Facade, constant_value, formula, of
+from .table import ARRAY_METHODS, WRITTEN, Facade, formula, of
 
 __all__: list[str] = []
 

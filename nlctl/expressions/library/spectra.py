@@ -9,13 +9,14 @@ import numpy as np
 
 from ..arithmetic import Arithmetic
 from ..arrays import Tracer, traced
+from ..constants import constant_value
 from ..graph import Graph, Untraceable
 from .complex_numbers import ComplexPair
 from .linear_algebra import NotComputed
 from .orthogonal import pseudoinverse, qr
 from .reductions import sum_along
 from .rotated import in_passes, singular_by_rotations, symmetric_by_rotations
-from .table import Facade, constant_value, of
+from .table import Facade, of
 
 __all__: list[str] = []
 

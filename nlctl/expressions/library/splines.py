@@ -10,12 +10,13 @@ import numpy as np
 
 from ..arithmetic import Arithmetic
 from ..arrays import Tracer, mapped, scalar, traced
+from ..constants import constant_value
 from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
 from . import scattered
 from .surfaces import surface
 from .table import enter
-from .tables import MOST_PIECES, constant_cells, interval_choice, interval_polynomial, polynomial
+from .tables import constant_cells, interval_choice, interval_polynomial, polynomial
 
 
 def called_object(graph: Graph, interpolant: object, *arguments: object, **options: object) -> Any:
@@ -96,8 +97,8 @@ def piecewise_polynomial(
                    for k in np.ndindex(shape)]  # fmt: skip
         return _in_columns(columns, shape, interpolant.axis, piecewise_polynomial, graph, x)
     breaks, coefficients = interpolant.x, interpolant.c
-    if breaks.size > MOST_PIECES or np.any(np.diff(breaks) <= 0):
-        raise Untraceable("a piecewise polynomial with too many pieces")
+    if np.any(np.diff(breaks) <= 0):
+        raise Untraceable("a piecewise polynomial whose intervals do not follow one another")
 
     def at(e: Expr) -> Expr:
         value = interval_polynomial(graph, e, breaks, coefficients.T)
@@ -189,8 +190,6 @@ def splev(graph: Graph, x: object, tck: Any, der: int = 0, ext: int = 0) -> Any:
 
 
 def _numbers(values: object) -> Any:
-    from .table import constant_value
-
     constant = constant_value(values) if isinstance(values, Tracer) else values
     if isinstance(constant, Tracer):
         raise Untraceable("a spline that depends on the state or on parameters")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Special, Tracer, traced
+from ..constants import constant_value
 from ..functions import FUNCTIONS
 from ..graph import NUMPY, Graph, Untraceable
 from ..operators import elementwise
@@ -86,23 +87,6 @@ class NumberType:
 def unwrapped(value: object) -> Any:
     """Return the type that stands behind a value, any other value as it is."""
     return value.real if isinstance(value, NumberType) else value
-
-
-def constant_value(value: Tracer) -> Any:
-    """Return an array of constants as numbers, any other as it is."""
-    elements = value.values.flat
-    if any(e.op not in ("const", "table") for e in elements):
-        return value
-    kinds = {e.kind for e in value.values.flat}
-    as_number = {"b": bool, "i": int}.get(kinds.pop() if len(kinds) == 1 else "f", float)
-    if not value.shape:
-        return as_number(value.only.data)
-    if value.axis is not None and any(e.op != "table" for e in value.values.flat):
-        rows = [np.full(value.length, e.data) if e.op == "const" else np.array(e.data)
-                for e in value.values.flat]  # fmt: skip
-        whole = np.array(rows).reshape(*value.values.shape, value.length)
-        return np.moveaxis(whole, -1, value.axis)
-    return np.array([as_number(e.data) for e in value.elements().flat]).reshape(value.shape)
 
 
 def known_numbers(value: object, what: str) -> np.ndarray:

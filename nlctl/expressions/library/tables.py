@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import functools
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -10,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, mapped, traced
+from ..constants import constant_value
 from ..graph import Expr, Graph, Untraceable
+from ..many_pieces import count_below, of_interval
 from ..operators import elementwise
 from .table import known_numbers, of
 
@@ -21,13 +24,10 @@ MOST_PIECES = 256
 
 def _constants(graph: Graph, values: object, what: str) -> np.ndarray:
     """Return what must be known when a function is traced."""
-    array = traced(graph, values)
-    elements = array.elements()
-    if array.ndim != 1 or any(e.op != "const" for e in elements):
+    array = constant_value(traced(graph, values))
+    if isinstance(array, Tracer) or np.ndim(array) != 1:
         raise Untraceable(f"{what} that depend on the state or on parameters")
-    if array.size > MOST_PIECES:
-        raise Untraceable("a table with too many places")
-    return np.array([e.data for e in elements], dtype=float)
+    return np.asarray(array, dtype=float)
 
 
 def constant_cells(graph: Graph, values: np.ndarray) -> Any:
@@ -39,6 +39,8 @@ def interval_choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequ
     """Return the piece of the interval of x: the first below all bounds, by halving."""
     if len(pieces) == 1:
         return pieces[0]
+    if len(pieces) > MOST_PIECES:
+        return of_interval(graph, x, np.asarray(bounds), [_numbers(pieces)])[0]
     middle = len(pieces) // 2
     low = interval_choice(graph, x, bounds[: middle - 1], pieces[:middle])
     high = interval_choice(graph, x, bounds[middle:], pieces[middle:])
@@ -46,21 +48,36 @@ def interval_choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequ
     return graph.op("select", below, low, high)
 
 
+def _number(graph: Graph, c: Any) -> Expr:
+    return c if isinstance(c, Expr) else graph.const(float(c))
+
+
 def interval_polynomial(
     graph: Graph, x: Expr, breaks: Any, pieces: Iterable[Iterable[Any]]
 ) -> Expr:
     """Return the polynomial in x - start of the interval of x, the highest power first."""
 
-    def expr(c: Any) -> Expr:
-        return c if isinstance(c, Expr) else graph.const(float(c))
-
+    expr = functools.partial(_number, graph)
+    pieces = list(pieces)
+    if len(pieces) > MOST_PIECES:
+        columns = [breaks[:-1], *map(_numbers, zip(*pieces, strict=True))]
+        start, *here = of_interval(graph, x, np.asarray(breaks[1:-1]), columns)
+        breaks, pieces = [start, None], [here]
     values = []
     for start, (first, *others) in zip(breaks[:-1], pieces, strict=True):
-        inside, value = graph.op("sub", x, graph.const(float(start))), expr(first)
+        inside, value = graph.op("sub", x, expr(start)), expr(first)
         for c in others:
             value = graph.op("add", graph.op("mul", value, inside), expr(c))
         values.append(value)
     return interval_choice(graph, x, list(breaks[1:-1]), values)
+
+
+def _numbers(pieces: Iterable[Any]) -> np.ndarray:
+    """Return pieces of a long table as numbers."""
+    values = [c.data if isinstance(c, Expr) and c.op == "const" else c for c in pieces]
+    if any(isinstance(c, Expr) for c in values):
+        raise Untraceable("a long table of values that depend on the state or on parameters")
+    return np.array(values, dtype=float)
 
 
 @of(np.interp)
@@ -75,17 +92,19 @@ def interp(
 ) -> Tracer:
     """Return a piecewise linear function, its ends beyond the table."""
     places = _constants(graph, xp, "places of a table")
-    values = [graph.number(e) for e in traced(graph, fp).elements()]
+    given = constant_value(traced(graph, fp))
+    is_open = isinstance(given, Tracer)
+    values = [graph.number(e) for e in given.elements()] if is_open else given
     if period is not None and places.size == len(values):
         turn = abs(float(known_numbers(period, "periods")))
         x, places, left, right = elementwise(graph, "remainder", x, turn), places % turn, None, None
         order = np.argsort(places)
-        places, values = places[order], [values[k] for k in order]
-        places = np.concatenate([places[-1:] - turn, places, places[:1] + turn])
-        values = [values[-1], *values, values[0]]
+        around = [order[-1], *order, order[0]]
+        values = [values[k] for k in around] if is_open else values[around]
+        places = places[around] + np.array([-turn, *np.zeros(order.size), turn])
     if places.size != len(values) or np.any(np.diff(places) <= 0):
         raise Untraceable("a table whose places do not increase")
-    ends = [v if e is None else traced(graph, e).only for e, v in
+    ends = [_number(graph, v) if e is None else traced(graph, e).only for e, v in
             ((left, values[0]), (right, values[-1]))]  # fmt: skip
     array = traced(graph, x)
     return Tracer(
@@ -94,18 +113,18 @@ def interp(
 
 
 def _linear(
-    graph: Graph, x: Expr, places: np.ndarray, values: Sequence[Expr], left: Expr, right: Expr
+    graph: Graph, x: Expr, places: np.ndarray, values: Sequence[Any], left: Expr, right: Expr
 ) -> Expr:
     """Return NumPy's formula of an interval: slope (x - x_j) + f_j, and f_j at the last place."""
     op, const = graph.op, graph.const
-    x = graph.number(x)
-    slopes = (
+    x, last = graph.number(x), _number(graph, values[-1])
+    slopes = np.diff(values) / np.diff(places) if isinstance(values, np.ndarray) else [
         op("div", op("sub", b, a), const(float(width)))
         for (a, b), width in zip(pairwise(values), np.diff(places), strict=True)
-    )
+    ]  # fmt: skip
     pieces = zip(slopes, values, strict=False)
-    value = interval_polynomial(graph, x, places, pieces) if places.size > 1 else values[0]
-    value = op("select", op("eq", x, const(float(places[-1]))), values[-1], value)
+    value = interval_polynomial(graph, x, places, pieces) if places.size > 1 else last
+    value = op("select", op("eq", x, const(float(places[-1]))), last, value)
     value = op("select", op("gt", x, const(float(places[-1]))), right, value)
     return op("select", op("lt", x, const(float(places[0]))), left, value)
 
@@ -114,6 +133,8 @@ def _place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
     """Return how many bounds are below x; NaN is behind all."""
     x = graph.number(x)
     name = "lt" if side == "left" else "le"
+    if bounds.size > MOST_PIECES:
+        return count_below(graph, name, bounds, x)
     count = graph.const(0)
     for bound in bounds:
         beyond = graph.op(name, graph.const(float(bound)), x)

@@ -1,0 +1,130 @@
+"""Tables of measured data in functions: many points, and places that are computed."""
+
+from __future__ import annotations
+
+import bisect
+
+import control as ct
+import numpy as np
+import pytest
+from scipy import interpolate
+
+import nlctl
+
+END = 10.0
+
+
+def _tables(n):
+    rng = np.random.default_rng(n)
+    places, values = np.linspace(0.0, END, n), rng.normal(size=n)
+    scattered = np.sort(rng.uniform(0.0, END, n))
+    rows, numbers, step = rng.normal(size=(n, 2)), list(map(float, values)), END / (n - 1)
+    counts, of_numpy, ordered = list(range(n)), list(values), list(places)
+    spline = interpolate.CubicSpline(places, np.sin(places))
+    held = interpolate.interp1d(places, values, kind="previous", fill_value="extrapolate")
+    several = interpolate.interp1d(places, rows, axis=0, fill_value="extrapolate")
+    knots = interpolate.make_interp_spline(places, np.cos(places))
+    return {
+        "interp": lambda s: np.interp(s, places, values),
+        "interp of scattered places": lambda s: np.interp(s, scattered, values, left=-3.0),
+        "searchsorted": lambda s: values[min(np.searchsorted(places, s), n - 1)],
+        "searchsorted right": lambda s: values[np.searchsorted(places, s, side="right") - 1],
+        "digitize": lambda s: 0.01 * np.digitize(s, scattered),
+        "bisect": lambda s: numbers[bisect.bisect_right(ordered, s) - 1],
+        "an array": lambda s: values[int(s / step)],
+        "a list": lambda s: numbers[min(int(s / step), len(numbers) - 1)],
+        "from the end": lambda s: values[-1 - int(s / step)],
+        "a list of NumPy's": lambda s: of_numpy[int(s / step)],
+        "integers": lambda s: numbers[counts[int(s / step)]] / (1 + counts[int(s / step)]),
+        "a row": lambda s: rows[int(s / step)].sum(),
+        "a column": lambda s: rows[int(s / step), 1],
+        "take": lambda s: np.take(values, int(s / step)),
+        "by hand": lambda s: (
+            (k := min(int(s / step), n - 2)) * 0.0
+            + values[k]
+            + (s - places[k]) / step * (values[k + 1] - values[k])
+        ),
+        "a spline": lambda s: spline(s),
+        "a spline's slope": lambda s: spline(s, 1),
+        "a spline by knots": lambda s: knots(s),
+        "held": lambda s: held(s),
+        "several": lambda s: several(s)[1],
+    }
+
+
+@pytest.mark.parametrize("n", [200, 600])
+@pytest.mark.parametrize("name", list(_tables(4)))
+def test_a_table_is_what_python_finds(name, n):
+    """At random, at the places, next to them, and of the state as of the time."""
+    table = _tables(n)[name]
+    rng, places = np.random.default_rng(1), np.linspace(0.0, END, n)
+    some = rng.choice(places[1:-1], 20)
+    points = [*rng.uniform(0.0, END, 20), *some, *np.nextafter(some, -1), *np.nextafter(some, 11)]
+    for function in (
+        lambda t, x, u, params: [-x[0] + table(t)],
+        lambda t, x, u, params: [t - table(x[0])],
+    ):
+        block = ct.nlsys(function, None, states=1, inputs=0, outputs=1, name="block")
+        compiled = nlctl.compile(block)
+        assert not compiled.equations.calls
+        for s in points:
+            expected = block.dynamics(s, [s], [])
+            np.testing.assert_allclose(compiled.dynamics(s, [s], []), expected, 1e-12, 1e-12)
+
+
+def test_no_value_of_a_table_is_passed_over():
+    """The integral of 1,001 held values: their sum."""
+    values = np.random.default_rng(3).normal(size=1001)
+    for kind in (values, list(map(float, values)), tuple(map(float, values))):
+        block = ct.nlsys(
+            lambda t, x, u, params, kind=kind: [kind[int(100 * t)]],
+            None, states=1, inputs=0, outputs=1, name="block",
+        )  # fmt: skip
+        run = nlctl.input_output_response(block, [0.0, 5.0, 10.0], 0, [0.0])
+        # 100 * t is an integer next to k / 100, not there
+        np.testing.assert_allclose(run.states[0, 1:], values[:1000].cumsum()[[499, 999]] / 100,
+                                   rtol=0, atol=1e-9)  # fmt: skip
+
+
+def test_a_straight_table_of_many_places_is_a_straight_line():
+    """x' = -(2 x + 1), read from a table of its values, and its derivative."""
+    places = np.linspace(-3.0, 3.0, 801)
+    block = ct.nlsys(
+        lambda t, x, u, params: [-np.interp(x[0], places, 2.0 * places + 1.0)],
+        None, states=1, inputs=0, outputs=1, name="block",
+    )  # fmt: skip
+    times = np.linspace(0.0, 2.0, 9)
+    run = nlctl.input_output_response(block, times, 0, [1.0], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(run.states[0], 1.5 * np.exp(-2.0 * times) - 0.5, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(nlctl.compile(block).linearize([0.3]).A, [[-2.0]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("table", [np.arange(300.0), list(range(300)), [0.0, 1, 2.5]])
+def test_a_place_beyond_a_table_is_the_error_that_it_is(table):
+    block = ct.nlsys(
+        lambda t, x, u, params: [1.0 + 1e-9 * table[int(x[0])]],
+        None, states=1, inputs=0, outputs=1, name="block",
+    )  # fmt: skip
+    compiled = nlctl.compile(block)
+    assert compiled.dynamics(0.0, [-1.0], [])[0] == block.dynamics(0.0, [-1.0], [])[0]
+    assert np.isnan(compiled.dynamics(0.0, [300.0], [])[0])
+    with pytest.raises(IndexError, match="out of"):
+        nlctl.input_output_response(compiled, np.arange(500.0), 0, [1.0])
+
+
+def test_what_a_list_holds_is_followed_whatever_it_is():
+    """Functions, rows and numbers of several types, by a mode that the state says."""
+    laws = [lambda x: -x, lambda x: -2.0 * x**3, np.sin]
+    rows, mixed = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], [1, 0.5, np.float64(2.0)]
+
+    def update(t, x, u, params):
+        mode = int(abs(x[0])) % 3
+        return [laws[mode](x[0]) * mixed[int(t)] + rows[mode][1]]
+
+    block = ct.nlsys(update, None, states=1, inputs=0, outputs=1, name="block")
+    compiled = nlctl.compile(block)
+    assert not compiled.equations.calls
+    for t in (0.0, 1.5, 2.5):
+        for x in (-2.5, -0.5, 0.5, 1.0, 2.2, 7.1):
+            expected = block.dynamics(t, [x], [])
+            np.testing.assert_allclose(compiled.dynamics(t, [x], []), expected, rtol=1e-14)
