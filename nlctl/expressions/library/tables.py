@@ -100,7 +100,7 @@ def interp(
         x, places, left, right = elementwise(graph, "remainder", x, turn), places % turn, None, None
         order = np.argsort(places)
         around = [order[-1], *order, order[0]]
-        values = [values[k] for k in around] if is_open else values[around]
+        values = [values[k] for k in around] if is_open else np.asarray(values)[around]
         places = places[around] + np.array([-turn, *np.zeros(order.size), turn])
     if places.size != len(values) or np.any(np.diff(places) <= 0):
         raise Untraceable("a table whose places do not increase")
