@@ -94,7 +94,7 @@ def interp(
     places = _constants(graph, xp, "places of a table")
     given = constant_value(traced(graph, fp))
     is_open = isinstance(given, Tracer)
-    values = [graph.number(e) for e in given.elements()] if is_open else given
+    values: Any = [graph.number(e) for e in given.elements()] if is_open else given
     if period is not None and places.size == len(values):
         turn = abs(float(known_numbers(period, "periods")))
         x, places, left, right = elementwise(graph, "remainder", x, turn), places % turn, None, None
