@@ -384,11 +384,11 @@ class Graph:
             if a.size is None and all(arg.op == "concat" for arg in args[1:]):
                 return self._choice_of_pieces(*args)
             return args[2] if is_const[0] else self._inner_select(*args)
-        neutral = _NEUTRAL.get(name)
         for this, other, is_number in ((a, b, is_const[-1]), (b, a, is_const[0])):
             is_reversed = this is b and name in ("div", "sub") and len(args) == 2
-            if is_number and not is_reversed and neutral is not None and other.data == neutral:
-                return this
+            is_neutral = is_number and other.data == _NEUTRAL.get(name)
+            if is_neutral and not is_reversed and not (name == "sub" and np.signbit(other.data)):
+                return this  # x - (-0.0) is how a zero's sign is asked for
         if name == "copysign" and is_const[-1] and b.data == b.data:
             size = self.op("absolute", a)
             return size if np.copysign(1.0, b.data) > 0.0 else self.op("neg", size)

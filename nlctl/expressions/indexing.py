@@ -85,8 +85,8 @@ def _open_place(key: object) -> int | None:
     return None
 
 
-def _with(key: object, place: int, index: int) -> Any:
-    """Return an index with a number in one place."""
+def _with(key: object, place: int, index: int | slice) -> Any:
+    """Return an index with another one in one place."""
     if not isinstance(key, tuple):
         return index
     return (*key[:place], index, *key[place + 1 :])

@@ -174,6 +174,8 @@ class LatexWriter:
             if arg.op in signs and arg not in self.known:
                 yield from self._terms(arg, its_sign, index, depth)
                 continue
+            if expr.op == "sub" and arg.op == "const" and arg.data == 0.0:
+                continue  # what asks for a zero's sign
             text = self._held(arg, index, depth, TERM)
             negative = text.startswith("-")
             yield f"{flip[its_sign] if negative else its_sign} {text[1:] if negative else text}"

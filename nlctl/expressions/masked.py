@@ -95,6 +95,15 @@ class Masked(Computed):
         """Return their mean, NaN if there is none."""
         return elementwise(self.whole.graph, "div", self.sum(), self.count())
 
+    def var(self) -> Tracer:
+        """Return their mean square deviation from the mean."""
+        away = self.whole - self.mean()
+        return Masked(away * away, self.mask).mean()
+
+    def std(self) -> Tracer:
+        """Return the square root of that."""
+        return elementwise(self.whole.graph, "sqrt", self.var())
+
     size = property(count)
 
     def max(self) -> Tracer:

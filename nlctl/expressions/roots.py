@@ -78,14 +78,20 @@ class Root:
     def __getattr__(self, name: str) -> Any:
         raise Untraceable(f"{name} of a root: how many passes it has taken")
 
+    def __getitem__(self, name: str) -> Any:
+        return getattr(self, name)
+
 
 def root_scalar(
-    f, args=(), method=None, bracket=None, fprime=None, x0=None, x1=None, xtol=None, rtol=None,
-    maxiter=None,
+    f, args=(), method=None, bracket=None, fprime=None, fprime2=None, x0=None, x1=None, xtol=None,
+    rtol=None, maxiter=None,
 ):  # fmt: skip
     """Return a root by the method that is named, or for which there is what it needs."""
+    if fprime is True:
+        both, f, fprime = f, lambda v, *more: both(v, *more)[0], lambda v, *more: both(v, *more)[1]
     if method is None:
         by_tangents = "newton" if callable(fprime) else "secant" if x1 is not None else None
+        by_tangents = "halley" if callable(fprime) and callable(fprime2) else by_tangents
         method = "brentq" if bracket is not None else by_tangents
     named = {"rtol": rtol, "maxiter": maxiter}
     named = {name: value for name, value in named.items() if value is not None}
@@ -96,6 +102,8 @@ def root_scalar(
     named |= {} if xtol is None else {"tol": xtol}
     if method == "newton" and callable(fprime):
         return _found(newton(f, x0, fprime, args, **named), method)
+    if method == "halley" and callable(fprime) and callable(fprime2):
+        return _found(newton(f, x0, fprime, args, fprime2=fprime2, **named), method)
     if method == "secant":
         return _found(newton(f, x0, None, args, x1=x1, **named), method)
     return refused(f"scipy.optimize.root_scalar by {method or 'differences'}")
@@ -105,9 +113,21 @@ def _found(root, method):
     return Root(root=root, method=method, converged=True, flag="converged")
 
 
-def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
+def _reported(root, method, full_output, disp):
+    """Return a root, and with it what SciPy reports if that is asked for."""
+    if not disp:
+        return refused(f"scipy.optimize.{method} with disp=False: what comes where it fails")
+    return (root, _found(root, method)) if full_output else root
+
+
+def brentq(
+    f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100, full_output=False,
+    disp=True,
+):  # fmt: skip
     """Return a root between two places with values of opposite signs, by Brent's method."""
-    return with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter), args)
+    args = args if isinstance(args, tuple) else (args,)
+    root = with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter), args)
+    return _reported(root, "brentq", full_output, disp)
 
 
 def _by_brent(f, a, b, args, xtol, rtol, maxiter):
@@ -143,8 +163,16 @@ def _by_brent(f, a, b, args, xtol, rtol, maxiter):
     raise RuntimeError("Failed to converge")
 
 
-def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
+def bisect(
+    f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100, full_output=False,
+    disp=True,
+):  # fmt: skip
     """Return a root between two places with values of opposite signs, by halving."""
+    args = args if isinstance(args, tuple) else (args,)
+    return _reported(_by_halves(f, a, b, args, xtol, rtol, maxiter), "bisect", full_output, disp)
+
+
+def _by_halves(f, a, b, args, xtol, rtol, maxiter):
     left, right = np.multiply(1.0, a), np.multiply(1.0, b)
     width, first, last = right - left, f(left, *args), f(right, *args)
     if first * last > 0:
@@ -163,26 +191,39 @@ def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100
     raise RuntimeError("Failed to converge")
 
 
-def newton(func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, rtol=0.0, x1=None):
-    """Return a root near a place, by Newton's method or that of secants."""
-    if fprime is not None:
-        root = _tangents(func, np.multiply(1.0, x0), fprime, args, tol, maxiter, rtol)
-        return with_slope(func, root, args)
+def newton(
+    func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, fprime2=None, x1=None, rtol=0.0,
+    full_output=False, disp=True,
+):  # fmt: skip
+    """Return a root near a place, by Newton's method, Halley's or that of secants."""
+    if fprime is None:
+        root = _by_secants(func, x0, args, tol, maxiter, rtol, x1)
+    else:
+        root = _tangents(func, np.multiply(1.0, x0), fprime, fprime2, args, tol, maxiter, rtol)
+    return _reported(with_slope(func, root, args), "newton", full_output, disp)
+
+
+def _by_secants(func, x0, args, tol, maxiter, rtol, x1):
     p0 = np.multiply(1.0, x0)
     if x1 is None:
         p1 = p0 * (1 + 1e-4)
         p1 = np.where(p1 >= 0, p1 + 1e-4, p1 - 1e-4)
     else:
         p1 = np.multiply(1.0, x1)
-    return with_slope(func, _secants(func, p0, p1, args, tol, maxiter, rtol), args)
+    return _secants(func, p0, p1, args, tol, maxiter, rtol)
 
 
-def _tangents(func, p0, fprime, args, tol, maxiter, rtol):
+def _tangents(func, p0, fprime, fprime2, args, tol, maxiter, rtol):
     for _ in range(maxiter):
         value = func(p0, *args)
         if value == 0:
             return p0
-        p = p0 - value / fprime(p0, *args)
+        slope = fprime(p0, *args)
+        step = value / slope
+        if fprime2 is not None:  # Halley's method, where it is not far from Newton's
+            bend = step * fprime2(p0, *args) / slope / 2
+            step = np.where(abs(bend) < 1, step / (1.0 - bend), step)
+        p = p0 - step
         if abs(p - p0) <= tol + rtol * abs(p0):
             return p
         p0 = p

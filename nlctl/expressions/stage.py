@@ -173,7 +173,7 @@ class Stage:
             enter_scipy()
         if module.startswith("scipy.interpolate"):
             enter_splines()
-        if module.startswith(("scipy.integrate", "scipy.signal", "scipy.ndimage")):
+        if module.startswith(("scipy.integrate", "scipy.signal", "scipy.ndimage", "scipy.fft")):
             enter_linear_maps()
         try:
             return value in WRITTEN

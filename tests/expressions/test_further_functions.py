@@ -42,6 +42,15 @@ class Settings:
 SETTINGS = Settings()
 
 
+class Bunch(dict):
+    """A dict whose items are read as attributes, too."""
+
+    __getattr__ = dict.__getitem__
+
+
+BUNCH = Bunch(gain=3.0, inner=Bunch(offsets=np.array([1.0, 2.0])))
+
+
 def regular(x):
     return np.outer(x[:3], x[1:]) + 9.0 * np.eye(3)
 
@@ -59,6 +68,7 @@ def depth(n, z):
 
 
 FUNCTIONS = {
+    "items as attributes": lambda x: BUNCH.gain * x[0] + BUNCH.inner.offsets[1] + BUNCH["gain"],
     "bits of Python's integers": lambda x: (int(10 * x[0]) & 12) + (int(x[1]) | 5) ^ 6,
     "bits below zero": lambda x: (int(10 * x[0]) & -4) + (~int(x[1])),
     "shifts": lambda x: (int(10 * x[0]) >> 2) + (int(x[1]) << 3) + (1 << int(x[0] > 0)),
@@ -268,6 +278,14 @@ def test_where_nan_is_sorted_the_function_is_called():
     np.testing.assert_allclose(response.outputs[:, -1], np.exp(-1), rtol=1e-6)
     called = nlctl.input_output_response(compiled, [0.0, 1.0], -1.0, np.ones(6))
     np.testing.assert_allclose(called.outputs[:, -1], np.exp(-1), rtol=1e-6)
+
+
+def test_a_parameter_may_hold_its_items_as_attributes():
+    system = ct.nlsys(lambda t, x, u, p: [p["of"].gain * x[0]], None, states=1, inputs=1, outputs=1,
+                      params={"of": BUNCH})  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    assert compiled.dynamics(0.0, [0.5], [0.0]) == [1.5]
 
 
 KEYS = {1: 2.0, 2: 3.0}

@@ -72,12 +72,14 @@ class ComplexPair(Computed):
         self.real[key], self.imag[key] = value.real, value.imag
 
     def __pow__(self, exponent: object) -> ComplexPair:
-        if isinstance(exponent, float) and exponent > 0.0:
+        if isinstance(exponent, float) and exponent:
             size = elementwise(self.graph, "power", _absolute(self.graph, self), exponent)
             angle = elementwise(self.graph, "mul", _angle(self.graph, self), exponent)
             return rect(self.graph, size, angle)
-        if not isinstance(exponent, int) or not 0 <= exponent <= 64:
-            raise Untraceable("a power of complex numbers by something else than a number above 0")
+        if not isinstance(exponent, int) or abs(exponent) > 64:
+            raise Untraceable("a power of complex numbers by something else than a number")
+        if exponent < 0:
+            return _div(self.graph, paired(self.graph, 1.0), self**-exponent)
         unity = paired(self.graph, 1.0)
         return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), unity)
 
@@ -123,8 +125,27 @@ def paired(graph: Graph, value: object) -> ComplexPair:
 Special.of_complex = staticmethod(paired)
 
 
+def _plus(graph: Graph, a: Tracer, b: Tracer) -> Tracer:
+    """a + b with the sign of a zero, at which angles and roots jump: 0.0 changes that of -0.0."""
+    for one, other in ((a, b), (b, a)):
+        if _has_zeros(other):
+            return elementwise(graph, "sub", one, elementwise(graph, "neg", other))
+    return a + b
+
+
+def _minus(graph: Graph, a: Tracer, b: Tracer) -> Tracer:
+    """a - b with the sign of a zero."""
+    return _plus(graph, elementwise(graph, "neg", b), a) if _has_zeros(a) else a - b
+
+
+def _has_zeros(array: Tracer) -> bool:
+    elements = list(array.values.flat)
+    return all(e.op == "const" for e in elements) and any(e.data == 0.0 for e in elements)
+
+
 def _mul(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:
-    return ComplexPair(graph, a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real)
+    real = _minus(graph, a.real * b.real, a.imag * b.imag)
+    return ComplexPair(graph, real, _plus(graph, a.real * b.imag, a.imag * b.real))
 
 
 def paired_product(graph: Graph, a: object, b: object) -> ComplexPair:
@@ -146,19 +167,41 @@ def _sqrt(graph: Graph, z: ComplexPair) -> ComplexPair:
 
 
 def _div(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:
-    size = b.real * b.real + b.imag * b.imag
-    top = _mul(graph, a, b.conjugate())
+    """By the size of the divisor, whose square may be too large or too small."""
+    if _has_zeros(b.imag) and not any(e.data for e in b.imag.values.flat):
+        return ComplexPair(graph, a.real / b.real, a.imag / b.real)
+    size = _absolute(graph, b)
+    top = _mul(graph, a, ComplexPair(graph, b.real / size, b.imag / size).conjugate())
     return ComplexPair(graph, top.real / size, top.imag / size)
 
 
 def _exp(graph: Graph, z: ComplexPair) -> ComplexPair:
-    size = elementwise(graph, "exp", z.real)
+    half = elementwise(graph, "exp", z.real * 0.5)  # twice: e^710 is too large
     cos, sin = (elementwise(graph, f, z.imag) for f in ("cos", "sin"))
-    return ComplexPair(graph, size * cos, size * sin)
+    return ComplexPair(graph, half * cos * half, half * sin * half)
 
 
 def _log(graph: Graph, z: ComplexPair) -> ComplexPair:
     return ComplexPair(graph, elementwise(graph, "log", _absolute(graph, z)), _angle(graph, z))
+
+
+def _guarded_log(graph: Graph, z: ComplexPair) -> ComplexPair:
+    graph.guard(elementwise(graph, "ne", _absolute(graph, z), 0.0).only, ValueError)
+    return _log(graph, z)
+
+
+def _tanh(graph: Graph, z: ComplexPair) -> ComplexPair:
+    tanh, tan, cosh = (elementwise(graph, f, v) for f, v in
+                       (("tanh", z.real), ("tan", z.imag), ("cosh", z.real)))  # fmt: skip
+    size = tanh * tanh * tan * tan + 1.0
+    return ComplexPair(graph, tanh * (tan * tan + 1.0) / size, tan / cosh / cosh / size)
+
+
+def _wave(graph: Graph, z: ComplexPair, names: Sequence[str], sign: float) -> ComplexPair:
+    """Return a sine or a cosine, circular or hyperbolic, by those of both parts."""
+    a, b, c, d = (elementwise(graph, f, v) for f, v in
+                  zip(names, (z.real, z.imag) * 2, strict=True))  # fmt: skip
+    return ComplexPair(graph, a * b, c * d * sign)
 
 
 def _absolute(graph: Graph, z: ComplexPair) -> Tracer:
@@ -175,14 +218,19 @@ def _select(graph: Graph, condition: object, a: ComplexPair, b: ComplexPair) -> 
 
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    "add": lambda g, a, b: ComplexPair(g, a.real + b.real, a.imag + b.imag),
-    "sub": lambda g, a, b: ComplexPair(g, a.real - b.real, a.imag - b.imag),
+    "add": lambda g, a, b: ComplexPair(g, _plus(g, a.real, b.real), _plus(g, a.imag, b.imag)),
+    "sub": lambda g, a, b: ComplexPair(g, _minus(g, a.real, b.real), _minus(g, a.imag, b.imag)),
     "mul": _mul,
     "div": _div,
     "neg": lambda g, a: ComplexPair(g, -a.real, -a.imag),
     "absolute": _absolute,
     "exp": _exp,
     "sqrt": _sqrt,
+    "sin": lambda g, z: _wave(g, z, ("sin", "cosh", "cos", "sinh"), 1.0),
+    "cos": lambda g, z: _wave(g, z, ("cos", "cosh", "sin", "sinh"), -1.0),
+    "sinh": lambda g, z: _wave(g, z, ("sinh", "cos", "cosh", "sin"), 1.0),
+    "cosh": lambda g, z: _wave(g, z, ("cosh", "cos", "sinh", "sin"), 1.0),
+    "tanh": _tanh,
     "log": _log,
     "select": _select,
     "eq": lambda g, a, b: (a.real == b.real) & (a.imag == b.imag),
@@ -239,7 +287,7 @@ for _function in (np.fft.fft, np.fft.ifft, np.fft.rfft, np.fft.irfft):
 enter([complex], complex_number)
 enter([cmath.rect], rect)
 enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))
-enter([cmath.log], lambda graph, z: _log(graph, paired(graph, z)))
+enter([cmath.log], lambda graph, z: _guarded_log(graph, paired(graph, z)))
 enter([cmath.sqrt], lambda graph, z: _sqrt(graph, paired(graph, z)))
 enter([cmath.phase], lambda graph, z: _angle(graph, paired(graph, z)))
 enter(

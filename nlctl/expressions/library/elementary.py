@@ -29,7 +29,7 @@ def sinc(np: Facade, x: object) -> Any:
 @formula(np.angle)
 def angle(np: Facade, x: Arithmetic, deg: bool = False) -> Any:
     """The angle of a complex number."""
-    phase = np.arctan2(x.imag, x.real) if isinstance(x, ComplexPair) else np.arctan2(0.0 * x, x)
+    phase = np.arctan2(x.imag if isinstance(x, ComplexPair) else 0.0, np.real(x))
     return phase * (180.0 / np.pi) if deg else phase
 
 
@@ -194,7 +194,7 @@ _FORMULAS = (
     ((np.float_power,), lambda np, x, y: np.power(x * 1.0, y)),
     ((np.positive, np.real), lambda np, x: x.real if isinstance(x, ComplexPair) else x),
     ((np.conj,), lambda np, x: x.conjugate() if isinstance(x, ComplexPair) else x),
-    ((np.imag,), lambda np, x: x.imag if isinstance(x, ComplexPair) else 0.0 * x),
+    ((np.imag,), lambda np, x: x.imag if isinstance(x, ComplexPair) else np.zeros_like(x)),
     ((np.isnan, math.isnan), lambda np, x: x != x),
     ((np.isfinite, math.isfinite), lambda np, x: np.abs(x) < math.inf),
     ((np.isinf, math.isinf), lambda np, x: np.abs(x) == math.inf),

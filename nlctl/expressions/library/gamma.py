@@ -10,8 +10,10 @@ import math
 from functools import reduce
 from typing import Any
 
+from ..arrays import traced
 from ..graph import Untraceable
 from ..operators import elementwise
+from .rotated import in_passes
 from .table import Facade, known_numbers
 
 _STEPS = 8  # z + 8 >= 8.5: what the series leaves out is below 3e-16
@@ -23,16 +25,32 @@ def loggamma_of_size(np: Facade, x: Any) -> Any:
     """ln |gamma(x)|."""
     left = x < 0.5
     z = np.where(left, 1.0 - x, x)
-    value = _stirling(np, z) - np.log(_product(z))
-    return np.where(left, np.log(math.pi / np.abs(_sine(np, x))) - value, value)
+    value = _stirling(np, z) - np.log(_product(np, z))
+    return np.where(left, math.log(math.pi) - np.log(np.abs(_sine(np, x))) - value, value)
+
+
+def betaln(np: Facade, a: Any, b: Any) -> Any:
+    """ln of the beta function of positive numbers; of a large one by differences of the series."""
+    for v in (a, b):
+        for e in traced(np.graph, v).elements().flat:
+            np.graph.limited(np.graph.op("gt", e, np.graph.const(0.0)))
+    with in_passes(np.graph):
+        s, z = np.minimum(a, b), np.maximum(a, b)
+        far, farther = z + _STEPS, z + s + _STEPS
+        ratio = reduce(lambda p, k: p * (1.0 + s / (z + k)), range(1, _STEPS), 1.0 + s / z)
+        rest = _series(farther) - _series(far) + (far - 0.5) * np.log1p(s / far)
+        return loggamma_of_size(np, s) - rest + s - s * np.log(farther) + np.log(ratio)
 
 
 def gamma(np: Facade, x: Any) -> Any:
     """The gamma function: (x - 1)! of integers."""
     left = x < 0.5
     z = np.where(left, 1.0 - x, x)
-    value = np.exp(_stirling(np, z)) / _product(z)
-    return np.where(left, math.pi / (_sine(np, x) * value), value)
+    root = np.exp(0.5 * _stirling(np, z))  # gamma(z + 8) is too large before gamma(z) is
+    value = root / _product(np, z) * root
+    value = np.where(left, math.pi / (_sine(np, x) * value), value)
+    pole = np.where(x == 0.0, np.copysign(math.inf, x), math.nan)
+    return np.where((x <= 0.0) & (x == np.rint(x)), pole, value)
 
 
 def _sine(np: Facade, x: Any) -> Any:
@@ -43,17 +61,22 @@ def _sine(np: Facade, x: Any) -> Any:
     return (1.0 - 4.0 * odd) * np.sin(math.pi * (x - nearest))
 
 
-def _product(z: Any) -> Any:
-    """z (z + 1) ... (z + 7), by which gamma(z + 8) is larger."""
+def _product(np: Facade, z: Any) -> Any:
+    """z (z + 1) ... (z + 7), by which gamma(z + 8) is larger, as long as 8 counts."""
+    z = np.minimum(z, 1e30)
     return reduce(lambda a, b: a * b, (z + k for k in range(1, _STEPS)), z)
 
 
 def _stirling(np: Facade, z: Any) -> Any:
     """ln gamma(z + 8)."""
     far = z + _STEPS
+    return (far - 0.5) * np.log(far) - far + 0.5 * math.log(2 * math.pi) + _series(far)
+
+
+def _series(far: Any) -> Any:
+    """What Stirling's formula leaves out."""
     square = 1.0 / (far * far)
-    series = reduce(lambda total, c: total * square + c, reversed(_SERIES))
-    return (far - 0.5) * np.log(far) - far + 0.5 * math.log(2 * math.pi) + series / far
+    return reduce(lambda total, c: total * square + c, reversed(_SERIES)) / far
 
 
 _MOST = 40.0  # the largest exponent whose terms are written out

@@ -131,7 +131,7 @@ def _means(np_: Facade, m: Any) -> tuple[Any, Any]:
     """Return the common limit of arithmetic and geometric means, and what E subtracts."""
     a, b = 1.0 + 0.0 * m, np_.sqrt(1.0 - m)
     rest, weight = 0.5 * m, 0.5
-    for _ in range(10):
+    for _ in range(14):
         a, b, half = 0.5 * (a + b), np_.sqrt(a * b), 0.5 * (a - b)
         weight = 2.0 * weight
         rest = rest + weight * half * half
@@ -228,15 +228,3 @@ def digamma(np_: Facade, x: Any) -> Any:
     pole = (x == whole) & (x <= 0.0)
     value = np_.where(pole, math.nan, np_.where(left, turned, value))
     return np_.where(x == 0.0, -np_.copysign(math.inf, x), value)
-
-
-def betaln(loggamma: Callable[..., Any]) -> Callable[..., Any]:
-    """ln of the beta function of positive numbers; others are to be called."""
-
-    def written(np_: Facade, a: Any, b: Any) -> Any:
-        for v in (a, b):
-            for e in traced(np_.graph, v).elements().flat:
-                np_.graph.limited(np_.graph.op("gt", e, np_.graph.const(0.0)))
-        return loggamma(np_, a) + loggamma(np_, b) - loggamma(np_, a + b)
-
-    return written

@@ -167,6 +167,9 @@ def of_triangles(
 ) -> Tracer:
     """Return the solution of equations from the factors of SciPy's `scipy.linalg.lu_factor`."""
     lu, pivots = lu_and_piv
+    if isinstance(lu, _Factors) and lu is pivots:
+        matrix = lu.__dict__["matrix"]
+        return solved(graph, matrix if trans == 0 else matrix.T, b)
     exchanges = pivots if isinstance(pivots, np.ndarray) else constant_value(traced(graph, pivots))
     if trans != 0 or not isinstance(exchanges, np.ndarray):
         raise Untraceable("factors that are transposed, or whose exchanges depend on the state")
@@ -240,6 +243,16 @@ def inv(graph: Graph, a: object) -> Any:
         return _solved_pairs(graph, a, np.eye(len(paired(graph, a))))
     n = len(traced(graph, a))
     return solved(graph, a, np.eye(n))
+
+
+_of_squares = WRITTEN[np.linalg.matrix_power]
+
+
+@of(np.linalg.matrix_power)
+def _matrix_power(graph: Graph, a: object, n: Any) -> Any:
+    """Return the power of a matrix; one below 0 is that of its inverse."""
+    is_inverse = isinstance(n, int) and n < 0
+    return _of_squares(graph, inv(graph, a), -n) if is_inverse else _of_squares(graph, a, n)
 
 
 @of(np.linalg.det)
@@ -320,6 +333,22 @@ def lstsq(graph: Graph, a: object, b: object, rcond: Any = None) -> tuple[Any, .
         rest = total(elementwise(graph, "mul", apart, apart), 0)
         rest = rest if rest.shape else rest.reshape(1)
     return solution, rest, rank, traced(graph, singular)
+
+
+class _Factors(NotComputed):
+    """The factors of a matrix, of which nothing but a solution can be asked."""
+
+    def __init__(self, matrix: Tracer) -> None:
+        super().__init__("elements of the factors of a matrix that the state decides")
+        self.__dict__["matrix"] = matrix
+
+
+def lu_factor(
+    graph: Graph, a: object, overwrite_a: bool = False, check_finite: bool = True
+) -> tuple[Any, Any]:
+    """Return what `of_triangles` takes, as SciPy's `scipy.linalg.lu_factor`."""
+    factored = _Factors(traced(graph, a).copy())
+    return factored, factored
 
 
 @of(np.linalg.cholesky)

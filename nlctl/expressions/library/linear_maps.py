@@ -20,10 +20,11 @@ _MOST = 64  # elements of the data
 @functools.cache
 def enter_linear_maps() -> None:
     """Enter them; the data are the first argument, the third one of a filter."""
-    from scipy import integrate, ndimage, signal
+    from scipy import fft, integrate, ndimage, signal
 
     for function in (integrate.simpson, signal.savgol_filter, signal.detrend,
-                     ndimage.gaussian_filter1d, ndimage.uniform_filter1d):  # fmt: skip
+                     ndimage.gaussian_filter1d, ndimage.uniform_filter1d, fft.dct, fft.idct,
+                     fft.dst, fft.idst):  # fmt: skip
         enter([function], _by_matrix(function, 0))
     for function in (signal.lfilter, signal.filtfilt, ndimage.correlate1d, ndimage.convolve1d):
         place = 2 if function in (signal.lfilter, signal.filtfilt) else 0

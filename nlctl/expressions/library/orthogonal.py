@@ -128,6 +128,7 @@ def root_of_matrix(graph: Graph, a: object) -> Tracer:
     """Return the square root of a matrix of two rows with eigenvalues to the right of 0."""
     (p, q), (r, s) = _columns(graph, a)
     np_ = Facade(graph)
+    _limited(graph, np_.isfinite(0.0 * p + 0.0 * q + 0.0 * r + 0.0 * s))
     determinant = p * s - q * r
     _limited(graph, np_.logical_and(determinant > 0.0, p + s > 0.0))
     product = np_.sqrt(determinant)

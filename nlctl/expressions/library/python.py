@@ -261,13 +261,17 @@ def vectorize(graph: Graph, function: Callable[..., Any], otypes: object = None)
 
     are_floats = otypes in ("d", [float], [np.float64], ["d"], ["float"], ["f8"])
 
-    def each(*arguments: object) -> Any:
-        arrays = [traced(graph, a).short() for a in arguments]
+    def each(*arguments: object, **named: object) -> Any:
+        arrays = [traced(graph, a).short() for a in (*arguments, *named.values())]
         shape = np.broadcast_shapes(*(a.shape for a in arrays))
         zero = traced(graph, np.zeros(shape))
         arrays = [elementwise(graph, "add", a, zero) for a in arrays]
         numbers = [[_handed_over(graph, a[index]) for a in arrays] for index in np.ndindex(shape)]
-        results = [traced(graph, function(*row)) for row in numbers]
+        count = len(arguments)
+        results = [
+            traced(graph, function(*row[:count], **dict(zip(named, row[count:], strict=True))))
+            for row in numbers
+        ]
         if any(f.shape or not (are_floats or _is_float(graph, f)) for f in results):
             raise Untraceable("np.vectorize of something else than floats")
         results = [scalar(graph, graph.number(f.only)) for f in results]

@@ -65,7 +65,12 @@ def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
         *,
         keepdims: bool = False,
         initial: object = None,
+        where: object = True,
     ) -> Any:
+        if where is not True:
+            if initial is None:
+                raise ValueError("an extreme of chosen elements without initial")
+            values = elementwise(graph, "select", where, values, initial)
         if isinstance(values, Masked | MaskedPlaces) and axis is initial is None:
             return values.max() if name == "maximum" else values.min()
 
@@ -401,6 +406,8 @@ def norm(
     if x.ndim == 2 and axis is None and ord in (2, -2, "nuc"):
         values = WRITTEN[_SINGULAR](np.graph, x, compute_uv=False)
         return np.sum(values) if ord == "nuc" else values[0 if ord == 2 else -1]
+    if x.ndim == 1 and isinstance(ord, int | float) and ord != 2:
+        return np.power(np.sum(np.power(size, ord)), 1.0 / ord) if ord else np.sum(x != 0.0) * 1.0
     is_euclidean = ord is None or ord == "fro" or (ord == 2 and (x.ndim == 1 or axis is not None))
     if not is_euclidean:
         raise Untraceable(f"the norm {ord!r} of this array")
@@ -416,6 +423,11 @@ _FORMULAS = (
     (np.nanmean,
      lambda np, values, axis=None:
      np.nansum(values, axis) / np.sum(np.equal(values, values), axis)),
+    (np.nanvar,
+     lambda np, values:
+     np.sum(np.where(values == values, np.square(values - np.nanmean(values)), 0.0))
+     / np.sum(np.equal(values, values))),
+    (np.nanstd, lambda np, values: np.sqrt(np.nanvar(values))),
 )  # fmt: skip
 for _function, _written in _FORMULAS:
     formula(_function)(_written)

@@ -18,15 +18,23 @@ from .cells import by_numpy
 from .complex_numbers import ComplexPair
 from .creation import whole_numbers
 from .exponential import expm
-from .gamma import gamma, loggamma_of_size, lower_gamma, upper_gamma
+from .gamma import betaln, gamma, loggamma_of_size, lower_gamma, upper_gamma
 from .integral_functions import bessel, exponential_integral, macdonald, modified_bessel
 from .integrals import fixed_quad, quad
-from .linear_algebra import cholesky_factor, of_bands, of_cholesky, of_triangle, of_triangles
+from .linear_algebra import (
+    NotComputed,
+    cholesky_factor,
+    lu_factor,
+    of_bands,
+    of_cholesky,
+    of_triangle,
+    of_triangles,
+)
 from .orthogonal import lyapunov, root_of_matrix, scipys_qr
 from .python import guard_whole
-from .reductions import prod, sum_along
+from .reductions import prod
 from .shapes import by_moving
-from .spectra import eigh, eigvalsh, guard_finite, pinv, svd
+from .spectra import eigh, eigvals, eigvalsh, guard_finite, pinv, svd
 from .table import WRITTEN, Facade, enter, formula, of
 
 
@@ -73,6 +81,9 @@ def _enter_matrices(linalg: Any) -> None:
     for name in ("toeplitz", "circulant", "hankel", "companion"):
         enter([getattr(linalg, name)], by_numpy(getattr(linalg, name)))
     enter([linalg.qr], scipys_qr)
+    enter([linalg.lu_factor], lu_factor)
+    enter([linalg.lstsq], _scipys_lstsq)
+    enter([linalg.eigvals], lambda graph, a, check_finite=True: eigvals(graph, a))
     enter([linalg.pinv], _scipys_pinv)
     enter([linalg.svdvals], lambda graph, a: svd(graph, a, compute_uv=False))
     enter(
@@ -135,6 +146,12 @@ def _distances(np: Facade, one: object, other: object) -> Any:
 def _scipys_pinv(graph: Graph, a: object) -> Any:
     size = max(traced(graph, a).shape)
     return pinv(graph, a, size * float(np.finfo(float).eps))
+
+
+def _scipys_lstsq(graph: Graph, a: object, b: object, check_finite: bool = True) -> Any:
+    solution = WRITTEN[np.linalg.lstsq](graph, a, b, float(np.finfo(float).eps))[0]
+    rest = NotComputed("residuals, rank or singular values of least squares")
+    return solution, rest, rest, rest
 
 
 def _scipys_eigh(graph: Graph, a: object, *, lower: bool = True, eigvals_only: bool = False) -> Any:
@@ -242,7 +259,8 @@ def huber(np: Facade, delta: Any, r: Arithmetic) -> Any:
 def pseudo_huber(np: Facade, delta: Any, r: object) -> Any:
     """As huber, and smooth."""
     share = r / np.where(delta == 0.0, 1.0, delta)
-    smooth = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
+    height = np.expm1(0.5 * np.log1p(share * share))
+    smooth = np.where((delta == 0.0) | np.equal(r, 0.0), 0.0, delta * delta * height)
     return np.where(delta < 0.0, math.inf, smooth)
 
 
@@ -251,12 +269,11 @@ def _relative_exponential(np: Facade, x: Any) -> Any:
     return np.where(x == 0.0, 1.0, np.expm1(x) / np.where(x == 0.0, 1.0, x))
 
 
-_logarithm_of_beta = integral_functions.betaln(loggamma_of_size)
 _OF_INTEGRALS = {
     **{name: getattr(integral_functions, name) for name in ("ellipk", "ellipe", "erfinv",
                                                             "erfcinv", "ndtri", "digamma")},
-    "betaln": _logarithm_of_beta,
-    "beta": lambda np, a, b: np.exp(_logarithm_of_beta(np, a, b)),
+    "betaln": betaln,
+    "beta": lambda np, a, b: np.exp(betaln(np, a, b)),
     "exprel": _relative_exponential,
     "entr": lambda np, x: np.where(x > 0.0, -x * np.log(np.where(x > 0.0, x, 1.0)),
                                    np.where(x == 0.0, 0.0, np.where(x < 0.0, -math.inf, x))),
@@ -329,10 +346,9 @@ of(math.trunc)(_whole("trunc"))
 def dist(np: Facade, p: object, q: object) -> Tracer:
     """Return the distance of two points."""
     apart = np.subtract(traced(np.graph, p), traced(np.graph, q))
-    return np.sqrt(np.sum(apart * apart))
+    return functools.reduce(np.hypot, list(apart), 0.0)
 
 
-of(math.fsum)(lambda graph, values: sum_along(graph, list(values)))
 of(math.prod)(
     lambda graph, values, *, start=1: elementwise(graph, "mul", start, prod(graph, list(values)))
 )

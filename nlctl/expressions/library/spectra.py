@@ -15,7 +15,7 @@ from .complex_numbers import ComplexPair
 from .linear_algebra import NotComputed
 from .orthogonal import pseudoinverse, qr
 from .reductions import sum_along
-from .rotated import singular_by_rotations, symmetric_by_rotations
+from .rotated import in_passes, singular_by_rotations, symmetric_by_rotations
 from .table import Facade, of
 
 __all__: list[str] = []
@@ -79,11 +79,13 @@ def svd(
 
 
 def _singular(graph: Graph, matrix: Tracer) -> Tracer:
+    guard_finite(graph, matrix, np.linalg.LinAlgError)
     if matrix.shape != (2, 2):
         return singular_by_rotations(graph, matrix)
     ((p, q), (r, s)), np_ = matrix, Facade(graph)
-    one, other = np_.hypot(p + s, r - q) * 0.5, np_.hypot(p - s, r + q) * 0.5
-    return traced(graph, [one + other, np_.abs(one - other)])
+    largest = np_.hypot(p + s, r - q) * 0.5 + np_.hypot(p - s, r + q) * 0.5
+    size = np_.where(largest == 0.0, 1.0, largest)
+    return traced(graph, [largest, np_.abs(p / size * s - q / size * r)])
 
 
 @of(np.linalg.cond)
@@ -107,7 +109,6 @@ def matrix_rank(graph: Graph, a: object, tol: object = None, **how: object) -> A
     matrix = _matrix(graph, a)
     if how:
         raise Untraceable("a rank with other arguments")
-    guard_finite(graph, matrix, np.linalg.LinAlgError)
     values = _singular(graph, matrix)
     limit = values[0] * (max(matrix.shape) * np.finfo(float).eps) if tol is None else tol
     return sum_along(graph, Facade(graph).greater(values, limit))
@@ -118,13 +119,21 @@ def eigvalsh(graph: Graph, a: object, UPLO: str = "L") -> Tracer:
     """Return the eigenvalues of a symmetric matrix; NumPy reads its lower half."""
     matrix, np_ = _matrix(graph, a), Facade(graph)
     matrix = matrix if UPLO == "L" else matrix.T
+    lower = [matrix[i, j] for i in range(len(matrix)) for j in range(i + 1)]
+    guard_finite(graph, lower, np.linalg.LinAlgError)
     if len(matrix) == 1:
         return matrix[0]
     if matrix.shape != (2, 2):
         return symmetric_by_rotations(graph, matrix)
     (p, _), (q, r) = matrix
-    middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
-    return traced(graph, [middle - spread, middle + spread])
+    with in_passes(graph):
+        middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
+        is_left = middle < 0.0
+        far = np_.where(is_left, middle - spread, middle + spread)  # nothing cancels
+        size = np_.where(far == 0.0, 1.0, far)
+        near = p / size * r - q / size * q
+        ends = [np_.where(is_left, far, near), np_.where(is_left, near, far)]
+    return traced(graph, ends)
 
 
 @of(np.linalg.eigh)
@@ -158,6 +167,7 @@ def pinv(graph: Graph, a: object, rcond: float = 1e-15) -> Any:
     matrix = _matrix(graph, a)
     if isinstance(numbers := constant_value(matrix), np.ndarray):
         return traced(graph, np.linalg.pinv(numbers, rcond))
+    guard_finite(graph, matrix, np.linalg.LinAlgError)
     wide = matrix.shape[0] < matrix.shape[1]
     columns = list(matrix if wide else matrix.T)
     if len(columns) > 2:

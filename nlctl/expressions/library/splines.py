@@ -12,6 +12,7 @@ from ..arithmetic import Arithmetic
 from ..arrays import Tracer, mapped, scalar, traced
 from ..constants import constant_value
 from ..graph import Expr, Graph, Untraceable
+from ..operators import elementwise
 from . import scattered
 from .surfaces import surface
 from .table import enter
@@ -84,8 +85,10 @@ def piecewise_polynomial(
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
     if nu:
         interpolant = interpolant.derivative(nu)
-    if interpolant.c.dtype != float or extrapolate == "periodic":
-        raise Untraceable("a piecewise polynomial with a period, or of complex numbers")
+    if interpolant.c.dtype != float:
+        raise Untraceable("a piecewise polynomial of complex numbers")
+    if extrapolate == "periodic":
+        x, extrapolate = _in_period(graph, x, *interpolant.x[[0, -1]]), False
     if interpolant.c.ndim > 2:
         from scipy.interpolate import PPoly
 
@@ -103,6 +106,12 @@ def piecewise_polynomial(
         return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
     return _elementwise(graph, x, at)
+
+
+def _in_period(graph: Graph, x: object, begin: float, end: float) -> Tracer:
+    """Return the same place in the first period, as SciPy has it."""
+    turned = elementwise(graph, "remainder", elementwise(graph, "sub", x, begin), end - begin)
+    return elementwise(graph, "add", begin, turned)
 
 
 def _in_columns(
@@ -137,7 +146,8 @@ def b_spline(graph: Graph, interpolant: Any, x: Any, nu: int = 0, extrapolate: A
 
     extrapolate = interpolant.extrapolate if extrapolate is None else extrapolate
     if extrapolate == "periodic":
-        raise Untraceable("a spline with a period")
+        ends = interpolant.t[[interpolant.k, -1 - interpolant.k]]
+        x, extrapolate = _in_period(graph, x, *ends), False
     if interpolant.c.ndim > 1:
         from scipy.interpolate import BSpline
 

@@ -14,7 +14,8 @@ from ..arrays import Tracer, mapped, traced
 from ..constants import constant_value
 from ..graph import Expr, Graph, Untraceable
 from ..many_pieces import count_below, of_interval
-from .table import of
+from ..operators import elementwise
+from .table import known_numbers, of
 
 __all__: list[str] = []
 
@@ -93,9 +94,16 @@ def interp(
     places = _constants(graph, xp, "places of a table")
     given = constant_value(traced(graph, fp))
     is_open = isinstance(given, Tracer)
-    values = [graph.number(e) for e in given.elements()] if is_open else given
-    if period is not None or places.size != len(values) or np.any(np.diff(places) <= 0):
-        raise Untraceable("a table with a period, or whose places do not increase")
+    values: Any = [graph.number(e) for e in given.elements()] if is_open else given
+    if period is not None and places.size == len(values):
+        turn = abs(float(known_numbers(period, "periods")))
+        x, places, left, right = elementwise(graph, "remainder", x, turn), places % turn, None, None
+        order = np.argsort(places)
+        around = [order[-1], *order, order[0]]
+        values = [values[k] for k in around] if is_open else np.asarray(values)[around]
+        places = places[around] + np.array([-turn, *np.zeros(order.size), turn])
+    if places.size != len(values) or np.any(np.diff(places) <= 0):
+        raise Untraceable("a table whose places do not increase")
     ends = [_number(graph, v) if e is None else traced(graph, e).only for e, v in
             ((left, values[0]), (right, values[-1]))]  # fmt: skip
     array = traced(graph, x)

@@ -61,7 +61,7 @@ def current_values(system: Any) -> Mapping[str, Any]:
 
 def is_numeric(value: object) -> bool:
     """Whether a parameter can vary between runs: a finite-shaped number or array of numbers."""
-    return not isinstance(value, str) and np.asarray(value).dtype.kind in "fib"
+    return not isinstance(value, str | dict) and np.asarray(value).dtype.kind in "fib"
 
 
 def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:

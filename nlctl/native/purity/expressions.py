@@ -428,8 +428,8 @@ class Expressions(ast.NodeVisitor):
             self.lists_may_hold_others()
         takes = [isinstance(f.known, Local) or f.known in known_calls.TAKING for f in called]
         if not all(p or t for p, t in zip(plain, takes, strict=True)):
-            for value in given.every:  # a list may have been given something to keep
-                self.kept(value, given.every)
+            for value in given.every:  # a list may have been given something else to keep
+                self.kept(value, [v for v in given.every if v is not value])
         return result
 
     def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
@@ -491,7 +491,7 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     missing = object()
     member = inspect.getattr_static(thing, name, missing)
     if member is missing:
-        return not hasattr(type(thing), "__getattr__")
+        return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
     simple = (FunctionType, staticmethod, classmethod)
     return (
         isinstance(member, simple)

@@ -351,7 +351,7 @@ def check_object(value: KnownValue, what: str) -> None:
         raise Impure(f"{what} an object of type {thing.cls.__name__}", "use arrays")
     if isinstance(thing, tuple) and hasattr(thing, "_fields"):
         return
-    if not value.own and hasattr(thing, "__next__"):
+    if not value.own and hasattr(type(thing), "__next__"):
         raise Impure(f"uses up {type(thing).__name__}, which it did not make", MEMORY)
     if library(type(thing)) is None:
         raise Impure(f"{what} an object of type {type(thing).__name__}", "use arrays")

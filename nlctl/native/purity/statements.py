@@ -27,6 +27,7 @@ from .values import (
     Instance,
     KnownValue,
     Local,
+    Unknown,
     captured,
     element,
     forgotten,
@@ -117,7 +118,9 @@ class CallWalker(Expressions):
         if base.holds and not base.inside:
             text = ast.unparse(node.target.value)
             raise Impure(f"changes an element of '{text}'", f"{MEMORY}, or {CHANGES}")
-        self.write(node.target, added)
+        numbers = added.inside and isinstance(added.known, Unknown | np.ndarray)
+        numbers = numbers and not isinstance(node.op, ast.Add)  # lists take in what is added
+        self.write(node.target, FRESH if numbers else added)
 
     def changed_object(
         self, node: ast.AugAssign, value: KnownValue, added: KnownValue

@@ -266,6 +266,29 @@ def asks_an_object(t, x, u, params):
 def measures_an_object(t, x, u, params):
     return x * len(COUNTER)
 
+def keeps_a_row_by_adding(t, x, u, params):
+    rows = {"a": []}
+    rows["a"] += [x]
+    rows["a"][0][0] = 1.0
+    return x
+
+def sorts_rows_into_one(t, x, u, params):
+    rows = [np.zeros(2)]
+    list.extend(rows, [x])
+    rows[1][0] = 1.0
+    return x
+
+def keeps_a_row_by_a_library(t, x, u, params):
+    rows = [np.zeros(2)]
+    operator.iconcat(rows, [x])
+    rows[1][0] = 1.0
+    return x
+
+def takes_a_row_by_key(t, x, u, params):
+    row = params["T"]
+    row += [1.0]
+    return x
+
 def yields(t, x, u, params):
     yield x
 """
@@ -339,6 +362,19 @@ def matches(t, x, u, params):
             return x
         case _:
             return -x
+
+def takes_away_from_rows(t, x, u, params):
+    rows = {"a": np.zeros(2), "b": np.ones(2)}
+    rows["a"] -= x
+    rows["b"] *= x
+    rows["a"][0] = 1.0
+    return rows["a"] * rows["b"]
+
+def sorts_what_is_outside(t, x, u, params):
+    sums = dict.fromkeys("ab", 0.0)
+    for name in sorted(params):
+        sums["a"] += x[0]
+    return [sums["a"], sums["b"]]
 
 def imports(t, x, u, params):
     import math
