@@ -34,6 +34,7 @@ from ...expressions.stage import Stage
 from ...expressions.without_poles import as_fraction, multiplied
 from ...wording import counted
 from ..codegen.plan import Store
+from .products import constant_factors, without_zeros
 
 _WEIGHT_ROWS = 3  # of "w": k, 1 / k, and 1 for k = 1, otherwise 0
 ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = range(_WEIGHT_ROWS)
@@ -233,7 +234,10 @@ class _Reader:
         if node.op in FUNCTIONS:
             return self._function(node)
         if node.op == "select":
-            parts, side = [self.term(a) for a in node.args[1:]], self.side(node.args[0])
+            parts = [self.term(a) for a in node.args[1:]]
+            if parts == [None, None] and self._is_steady(node.args[0]):
+                return None  # a place in a table: it need not be compared with each
+            side = self.side(node.args[0])
             if parts == [None, None]:
                 return None
             zero = self.graph.const(0.0)
@@ -329,7 +333,7 @@ class _Reader:
         total: Expr | None = None
         for i, (arg, term) in enumerate(zip(node.args, terms, strict=True)):
             if term is not None:
-                derivative = _steady(self.graph, self.partial(node, i), node)
+                derivative = without_zeros(self.graph, self.partial(node, i), node)
                 part = self._chained(arg, term, derivative)
                 part = part and self._unless_flat(part, arg, derivative)
                 total = self.graph.op("add", total, part) if total and part else total or part
@@ -338,7 +342,7 @@ class _Reader:
     def _chained(self, arg: Expr, term: Expr, derivative: Expr) -> Expr | None:
         """Return k times the coefficient of f(x): the sum over j = 1..k of j x_j d_{k-j}."""
         graph = self.graph
-        factors, inner = _factors(derivative)
+        factors, inner = constant_factors(derivative)
         slope = self.slope(arg)
         if not inner.varies:
             product = graph.op("mul", graph.op("mul", term, self.weight(ORDER_ROW)), inner)
@@ -392,6 +396,12 @@ class _Reader:
         if condition not in self.sides:
             self.sides[condition] = self._side(condition)
         return self.sides[condition]
+
+    def _is_steady(self, condition: Expr) -> bool:
+        """Whether all that a condition compares is constant within a step."""
+        if condition.op in LOGIC or condition.op == "select":
+            return all(self._is_steady(a) for a in condition.args)
+        return condition.op in COMPARISONS and all(self.term(a) is None for a in condition.args)
 
     def _side(self, node: Expr) -> Expr:
         graph, zero = self.graph, self.graph.const(0.0)
@@ -473,27 +483,3 @@ def _moved(graph: Graph, leaf: Expr, array: str, by: int) -> Expr:
 
 def _without_sign(node: Expr) -> tuple[Expr, bool]:
     return (node.args[0], True) if node.op == "neg" else (node, False)
-
-
-def _factors(node: Expr) -> tuple[list[Expr | None], Expr]:
-    """Return what an expression is multiplied by that does not vary, and the rest; None for -1."""
-    factors: list[Expr | None] = []
-    while True:
-        if node.op == "neg":
-            factors.append(None)
-            node = node.args[0]
-        elif node.op == "mul" and not all(a.varies for a in node.args) and node.varies:
-            varying = node.args[0].varies
-            factors.append(node.args[1] if varying else node.args[0])
-            node = node.args[0] if varying else node.args[1]
-        else:
-            return factors, node
-
-
-def _steady(graph: Graph, node: Expr, function: Expr) -> Expr:
-    """Return a derivative in which 0 x, which lets NaN through, is 0: x itself lets it through."""
-    if node in (function, *function.args) or not node.varies or node.op == "leaf":
-        return node
-    if node.op == "mul" and any(a.op == "const" and a.data == 0.0 for a in node.args):
-        return graph.const(0.0)
-    return graph.op(node.op, *(_steady(graph, a, function) for a in node.args))
