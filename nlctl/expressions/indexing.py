@@ -18,6 +18,7 @@ from .arrays import (
     holds_arrays,
     mapped,
     python_number,
+    scalar,
     traced,
 )
 from .constants import constant_value
@@ -126,13 +127,15 @@ def _gathered(self: Tracer, key: object, place: int) -> Any:
 
 def _looked_up(self: Tracer, key: object, place: int, chosen: Tracer) -> Any:
     """Return the item at a place of a long table of numbers."""
-    numbers = constant_value(_item(self, _with(key, place, slice(None))))
+    numbers, graph = constant_value(_item(self, _with(key, place, slice(None)))), self.graph
+    k = elementwise(graph, "select", elementwise(graph, "lt", chosen, 0),
+                    elementwise(graph, "add", chosen, self.shape[place]), chosen)  # fmt: skip
+    if isinstance(numbers, Tracer) and numbers.ndim == 1 and numbers.values.flat[0].kind == "f":
+        return scalar(graph, at_place(graph, k, numbers))
     if isinstance(numbers, Tracer) or numbers.dtype == bool:
         raise Untraceable("an integer that may name too many places")
     axis = sum(not isinstance(k, int) for k in key[:place]) if isinstance(key, tuple) else 0
-    rows, graph = np.moveaxis(numbers, axis, -1), self.graph
-    k = elementwise(graph, "select", elementwise(graph, "lt", chosen, 0),
-                    elementwise(graph, "add", chosen, rows.shape[-1]), chosen)  # fmt: skip
+    rows = np.moveaxis(numbers, axis, -1)
     cells = np.empty(rows.shape[:-1], dtype=object)
     for index in np.ndindex(cells.shape):
         cells[index] = at_place(graph, k, rows[index])

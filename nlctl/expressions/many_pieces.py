@@ -7,6 +7,7 @@ code over the table, instead of a choice for each of its pieces.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -18,28 +19,33 @@ _MOST = 65_536  # places; each evaluation looks at all of them
 _MOST_INTERVALS = 8192  # their ends are located in time, each by what all compare
 
 
-def at_place(graph: Graph, k: Tracer, values: np.ndarray) -> Expr:
+def at_place(graph: Graph, k: Tracer, values: Tracer | np.ndarray) -> Expr:
     """Return the number at a place of a table, which one of the places is."""
-    here = elementwise(graph, "eq", k, traced(graph, np.arange(float(values.size))))
-    number = _holding(graph, here, values)
-    return graph.integer(number) if values.dtype == int else number
-
-
-def _holding(graph: Graph, here: Tracer, values: np.ndarray) -> Expr:
-    """Return the number at the one place where a mask holds; 0 if it holds nowhere."""
-    kept = elementwise(graph, "select", here, traced(graph, _checked(values)), 0.0)
-    return graph.sum(kept.only, values.size)
-
-
-def count_below(graph: Graph, name: str, bounds: np.ndarray, x: Expr) -> Expr:
-    """Return how many bounds are below x, by the name of that order; NaN is behind all."""
-    if bounds.size > _MOST_INTERVALS:
+    size = values.shape[0]
+    if size > _MOST:
         raise Untraceable("a table with too many places")
-    table = traced(graph, _checked(bounds))
+    table = values if isinstance(values, Tracer) else traced(graph, values.astype(float))
+    here = elementwise(graph, "eq", k, traced(graph, np.arange(float(size))))
+    number = _total(graph, elementwise(graph, "select", here, table, 0.0))
+    is_whole = not isinstance(values, Tracer) and values.dtype == int
+    return graph.integer(number) if is_whole else number
+
+
+def _total(graph: Graph, vector: Tracer) -> Expr:
+    if vector.axis is not None:
+        return graph.sum(vector.only, vector.size)
+    return reduce(lambda a, b: graph.op("add", a, b), vector.cells.flat)
+
+
+def count_below(graph: Graph, name: str, bounds: Tracer | np.ndarray, x: Expr) -> Expr:
+    """Return how many bounds are below x, by the name of that order; NaN is behind all."""
+    size = bounds.shape[0]
+    if size > _MOST_INTERVALS:
+        raise Untraceable("a table with too many places")
+    table = bounds if isinstance(bounds, Tracer) else traced(graph, bounds)
     here = elementwise(graph, name, table, scalar(graph, x))
-    ones = elementwise(graph, "select", here, 1.0, 0.0)
-    count = graph.integer(graph.sum(ones.only, bounds.size))
-    return graph.op("select", graph.op("eq", x, x), count, graph.const(bounds.size))
+    count = graph.integer(_total(graph, elementwise(graph, "select", here, 1.0, 0.0)))
+    return graph.op("select", graph.op("eq", x, x), count, graph.const(size))
 
 
 def of_interval(
@@ -48,11 +54,3 @@ def of_interval(
     """Return of each column the number of the interval of x: the first below all bounds."""
     k = scalar(graph, count_below(graph, "le", bounds, x))
     return [at_place(graph, k, column) for column in columns]
-
-
-def _checked(values: np.ndarray) -> np.ndarray:
-    if values.size > _MOST:
-        raise Untraceable("a table with too many places")
-    if not np.all(np.isfinite(values)):
-        raise Untraceable("a long table with places or values that are not finite")
-    return values.astype(float)

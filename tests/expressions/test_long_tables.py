@@ -155,3 +155,35 @@ def test_each_place_that_a_state_passes_is_an_event(method):
     inner = offsets @ np.diff(angle) - slopes @ np.diff(np.cos(angle))
     outer = values[1] * angle[0] + values[-1] * (np.pi / 2 - angle[-1])
     np.testing.assert_allclose(run.states[3, 1], inner + outer, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("n", [2, 6, 300])
+def test_a_table_may_be_of_parameters(n):
+    """Places and values that a run may have otherwise: of the time, and of a state."""
+    rng = np.random.default_rng(n)
+    tables = [(np.sort(rng.uniform(0.0, 4.0, n)), rng.normal(size=n)) for _ in range(2)]
+
+    def update(t, x, u, params):
+        places, values = params["places"], params["values"]
+        held = values[min(int(t), n - 1)]
+        return [
+            np.interp(t, places, values, left=2.0) + held, np.interp(x[1], places, values) - x[1]
+        ]  # fmt: skip
+
+    (places, values), (others, more) = tables
+    block = ct.nlsys(
+        update, None, states=2, inputs=0, outputs=2, name="block",
+        params={"places": places, "values": values},
+    )  # fmt: skip
+    compiled = nlctl.compile(block)
+    assert not compiled.equations.calls
+    for params in ({}, {"places": others, "values": more}):
+        for t in (*rng.uniform(0.0, 4.0, 9), *others[:3], *places[:3], 0.0, 9.0):
+            expected = block.dynamics(t, [t, 4.0 - t], [], params=params)
+            found = compiled.dynamics(t, [t, 4.0 - t], [], params=params)
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+        run = nlctl.input_output_response(compiled, [0.0, 2.0, 5.0], 0, [0.0, 1.0], params=params)
+        other = nlctl.input_output_response(
+            block, [0.0, 2.0, 5.0], 0, [0.0, 1.0], params=params, engine="python-control",
+        )  # fmt: skip
+        np.testing.assert_allclose(run.states, other.states, rtol=0, atol=1e-5)

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, mapped, traced
+from ..arrays import Tracer, mapped, scalar, traced
 from ..constants import constant_value
 from ..graph import Expr, Graph, Untraceable
-from ..many_pieces import count_below, of_interval
+from ..many_pieces import at_place, count_below, of_interval
 from ..operators import elementwise
 from .table import known_numbers, of
 
@@ -91,6 +91,8 @@ def interp(
     period: object = None,
 ) -> Tracer:
     """Return a piecewise linear function, its ends beyond the table."""
+    if period is None and isinstance(constant_value(traced(graph, xp)), Tracer):
+        return _of_open_table(graph, x, (traced(graph, xp), traced(graph, fp)), (left, right))
     places = _constants(graph, xp, "places of a table")
     given = constant_value(traced(graph, fp))
     is_open = isinstance(given, Tracer)
@@ -127,6 +129,35 @@ def _linear(
     value = op("select", op("eq", x, const(float(places[-1]))), last, value)
     value = op("select", op("gt", x, const(float(places[-1]))), right, value)
     return op("select", op("lt", x, const(float(places[0]))), left, value)
+
+
+def _of_open_table(
+    graph: Graph, x: object, table: tuple[Tracer, Tracer], beyond: tuple[object, object]
+) -> Tracer:
+    """Return NumPy's interpolation in a table that is not known yet: one of parameters."""
+    xs, fs = table
+    if xs.ndim != 1 or xs.shape != fs.shape or xs.shape[0] < 2:
+        raise Untraceable("a table whose places and values are not two rows of one length")
+    op, size = graph.op, xs.shape[0]
+    rises = scalar(graph, count_below(graph, "le", xs[1:] - xs[:-1], graph.const(0.0)))
+    graph.guards.append(elementwise(graph, "eq", rises, 0).only)  # else NumPy finds anything
+    below, above = (traced(graph, fs[k] if v is None else v).only
+                    for k, v in zip((0, -1), beyond, strict=True))  # fmt: skip
+
+    def at(e: Expr) -> Expr:
+        x = graph.number(e)
+        k = scalar(graph, op("sub", count_below(graph, "le", xs, x), graph.const(1)))
+        k = elementwise(graph, "minimum", elementwise(graph, "maximum", k, 0), size - 2)
+        x_0, x_1, f_0, f_1 = (
+            at_place(graph, k, part) for part in (xs[:-1], xs[1:], fs[:-1], fs[1:])
+        )
+        slope = op("div", op("sub", f_1, f_0), op("sub", x_1, x_0))
+        value = op("add", op("mul", slope, op("sub", x, x_0)), f_0)
+        value = op("select", op("ge", x, xs[-1].only), fs[-1].only, value)
+        value = op("select", op("gt", x, xs[-1].only), above, value)
+        return op("select", op("lt", x, xs[0].only), below, value)
+
+    return Tracer(graph, mapped(at, traced(graph, x).elements()))
 
 
 def _place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
