@@ -187,3 +187,19 @@ def test_a_table_may_be_of_parameters(n):
             block, [0.0, 2.0, 5.0], 0, [0.0, 1.0], params=params, engine="python-control",
         )  # fmt: skip
         np.testing.assert_allclose(run.states, other.states, rtol=0, atol=1e-5)
+
+
+def test_what_follows_from_a_place_switches_with_it():
+    """Comparisons of held values, of their places, and of what these choose: sums of signs."""
+    values = np.random.default_rng(9).normal(size=500)
+
+    def update(t, x, u, params):
+        k = np.searchsorted(np.arange(1.0, 500.0), 50.0 * t, side="right")
+        sign = 1.0 if values[k] > 0 else -1.0
+        return [sign, max(sign, -0.5) * (k % 2), 1.0 if (sign > 0) == (k > 250) else 0.0]
+
+    block = ct.nlsys(update, None, states=3, inputs=0, outputs=3, name="block")
+    run = nlctl.input_output_response(block, [0.0, 10.0], 0, [0.0, 0.0, 0.0])
+    k, sign = np.arange(500), np.sign(values)
+    sums = [sign, np.maximum(sign, -0.5) * (k % 2), (sign > 0) == (k > 250)]
+    np.testing.assert_allclose(run.states[:, -1], [s.sum() / 50 for s in sums], rtol=0, atol=1e-9)

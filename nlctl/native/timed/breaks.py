@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from ...errors import ChatteringError
 from ...expressions.evaluate import evaluate_expressions
-from ...expressions.graph import Expr, needed
+from ...expressions.graph import ORDERS, Expr, needed
 from ..codegen.rewrite import computed_as_written
 from ..rounding.nudged import nudged_columns
 from .lines import Lines, NotLines, as_lines, levels_met, switches
@@ -28,6 +28,8 @@ _PIECES = 16  # of a cell in which they are farther, or count by more than one
 _SAME = 1e-12  # of the times: places that are one
 _ROUNDINGS = 8  # ways of rounding in which a condition must agree on either side of its switch
 _WIDER = 4.0
+_AT_POINTS = ("eq", "ne")  # these differ at points alone, or from where something else switches
+_CHOOSING = (*ORDERS, *_COUNTING, "sign", "heaviside")  # constant from one switch to the next
 
 Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 # of times: one integer between two switches and another one behind
@@ -62,6 +64,8 @@ def break_points(
     lines = as_lines(args, constant, span)
     jumps, until = [np.zeros(0)], [np.zeros(0)]
     for condition in conditions:
+        if _follows(condition, conditions):
+            continue
         crossed, elements = _known(condition, lines), range(condition.size or 1)
         levels = [partial(_level, condition, k) for k in elements]
         nodes = needed([condition])
@@ -89,6 +93,21 @@ def break_points(
             until.append(sides[0])
             jumps.append(np.minimum(sides[1], span[1]))
     return united(np.concatenate(until), np.concatenate(jumps))
+
+
+def _follows(condition: Expr, conditions: Container[Expr]) -> bool:
+    """Whether a condition changes only where others do: it compares what these have chosen."""
+    waiting, seen = list(condition.args), {condition}
+    while waiting:
+        node = waiting.pop()
+        chooses = node in conditions and node.op in _CHOOSING
+        if node in seen or not node.varies or chooses or node.op in _AT_POINTS:
+            continue
+        if node.op in ("leaf", "call", "solve"):
+            return False
+        seen.add(node)
+        waiting += node.args
+    return True
 
 
 def united(before: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
