@@ -45,6 +45,7 @@ def ordered(done, folder, text):
     return folder
 
 
+@pytest.mark.weekly
 @pytest.mark.parametrize(
     "text", ["".join(ORDERS), *(pytest.param(one, marks=pytest.mark.weekly) for one in ORDERS)]
 )

@@ -37,6 +37,7 @@ def smooth_differences(system, x, u):
 T = 0.31
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_derivatives_and_formulas_follow():

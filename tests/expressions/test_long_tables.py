@@ -52,8 +52,9 @@ def _tables(n):
     }
 
 
-@pytest.mark.parametrize("n", [200, 600])
-@pytest.mark.parametrize("name", list(_tables(4)))
+@pytest.mark.parametrize(
+    ("name", "n"), [(name, 600) for name in _tables(4)] + [("interp", 200), ("a list", 200)]
+)
 def test_a_table_is_what_python_finds(name, n):
     """At random, at the places, next to them, and of the state as of the time."""
     table = _tables(n)[name]

@@ -29,6 +29,7 @@ SEARCHES = {
 }
 
 
+@pytest.mark.weekly
 @pytest.mark.parametrize("x", [0.0, 3.0, 12.0])
 @pytest.mark.parametrize("name", SEARCHES)
 def test_roots_have_the_slope_of_what_is_zero_there(name, x):

@@ -25,6 +25,7 @@ def pulsed(begin, width):
     )  # fmt: skip
 
 
+@pytest.mark.weekly
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.weekly)])
 @pytest.mark.parametrize(("begin", "width"), [(3.33, 0.02), (0.01, 1e-4), (3.3, 0.05)])
 def test_a_pulse_between_samples_counts_for_each_member(begin, width, compiled):

@@ -25,6 +25,7 @@ LOOPS = {
 }
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_both_engines_agree(name):

@@ -131,9 +131,24 @@ def _accept(task, lanes, w, found, done, passed):
 def _counted(task, lane, w, event, j):
     """Count an accepted step; where a condition stays exactly 0 its steps across stay wide."""
     misses = lane.misses
-    step_accepted(lane, event)
+    step_accepted(lane, event, event and not _switches(task, w, j))
     if misses > 0 and _from_zero(task, w, True, j):
         lane.misses = misses  # what shorter ones add to a state is lost in rounding
+
+
+@numba.njit(**INNER)
+def _switches(task, w, j):
+    """Whether a step ends at an event of a switching function, and not where a memory turns."""
+    for i in range(task.rows.guarded):
+        before, now = w.events.g_start[i, j], w.events.g[i, j]
+        if opposite(before, now) and not at_zero(task, i, before):
+            return True
+        if left_to_other_side(task, w, i, j):
+            return True
+    for i in range(task.rows.guarded, task.rows.switching):
+        if w.guards.above[i - task.rows.guarded, j] != 0 and w.events.g[i, j] < 0.0:
+            return True
+    return False
 
 
 @numba.njit(**INNER)
@@ -190,7 +205,8 @@ def _take(task, lanes, w, done, passed):
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
-                passed[j] = moved = True
+                if lanes[j].quiet == 0:
+                    passed[j] = moved = True
         begin_next(task, w, j)
     return moved
 

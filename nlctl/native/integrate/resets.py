@@ -24,7 +24,6 @@ _MOST = 100  # jumps at one instant, or without progress of time
 _STILL = 1e-13  # of a time: less is no progress
 _HOVERS = 1e-13  # of a run: a ball that lies on the ground hops as far as rounding lets it
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
-_LONGER = 100.0  # times as far as from one jump to the next: the first step tried behind it
 _jumps_end = numba.njit(**INNER)(jumps_end)
 
 
@@ -138,14 +137,10 @@ def _jump(task, lanes, w, fallen, chosen):
 @numba.njit(**INNER)
 def _counted(task, lane):
     """Count jumps without progress of time, or in the first step after another."""
-    # Too many have no end. That they do not end is so from the first of them on. How closely a jump
-    # is located is a part of the step in which it is found: where jumps come ever faster, and with
-    # long steps, hops would not become shorter than that.
+    # Too many have no end. That they do not end is so from the first of them on.
     gone = lane.t - lane.fell_at
     still = max(_STILL * abs(lane.t), _HOVERS * (task.times[-1] - task.times[0]))
     lane.crowd = lane.crowd + 1 if gone <= max(still, 1.5 * lane.last) else 0
-    if gone > 0.0 and task.fixed == 0.0:
-        lane.h = min(lane.h, _LONGER * gone)
     lane.fell_at = lane.t
     lane.since = lane.since if lane.crowd else lane.t
     if lane.crowd > _MOST:

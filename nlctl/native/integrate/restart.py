@@ -47,6 +47,8 @@ def memory_rates(rhs, task, lanes, w, x, dx):
             noise = 1e-15 * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
             known = change == 0.0 or (abs(change) > noise and not _is_between(task, w, j))
             memories.rate[i, j] = change if known else memories.rate_start[i, j]
+            if lanes[j].quiet > 0:
+                memories.rate[i, j] = 0.0  # memories are committed step by step for a while
 
 
 @numba.njit(**INNER)

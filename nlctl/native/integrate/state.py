@@ -84,6 +84,8 @@ _FIELDS = [
     ("tries", "i8"),  # attempts at the event being located
     ("seeks", "i8"),  # whether that is where a memory jumps that no switching function tells of
     ("same_side", "i8"),  # of these in a row with the event inside
+    ("short", "i8"),  # turns of memories in a row right after another
+    ("quiet", "i8"),  # steps in which memory events are not looked for
     ("slow", "i8"),  # steps in a row whose size stability limits
     ("patience", "i8"),  # such steps that are borne before the stiff method is tried
     ("pace", "f8"),  # how far this method gets with the work of an explicit step (s), see `turns`

@@ -266,7 +266,7 @@ def _go_on(task, lane, w, found, carried, first, j):
                 return
             if found[j] == AGAIN:
                 return
-    for i in range(first if carried else 0, w.memories.m.shape[0]):
+    for i in range(first if carried else 0, 0 if lane.quiet > 0 else w.memories.m.shape[0]):
         known, x = _known_memory(task, lane, w, i, j, _DENSE)
         if known == _SUSPECT and w.memories.rate_start[i, j] == 0.0:
             shorten(lane, x)

@@ -25,6 +25,8 @@ REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
 FAR_SIDE = 0.9  # part of an attempt: the near side has not been looked at close to its end
 CONFIRMED = 3.0  # times as far as a line from the start says that a root lies
+SHORT = 1e-3  # part of a step: a shorter one between events is no progress
+PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
 
 
 @numba.njit(**INNER)
@@ -187,7 +189,7 @@ def jumped(task, lane, w, j):
     for i in range(memories.m.shape[0]):
         before = w.x_new[task.rows.memory[i], j]
         if memories.rate_start[i, j] != 0.0 or memories.slope[i, j] != 0.0:
-            continue  # it is carried along
+            continue  # it is carried along, also while memories are committed step by step
         changed = _apart(task, before, memories.m[i, j])
         if lane.seeks > 0 and task.pair.inside[1 if is_stiff(lane) else 0, 0] != 0.0:
             for n in range(3):
@@ -228,11 +230,18 @@ def locate_jump(lane, rtol, is_behind):
 
 
 @numba.njit(**INNER)
-def step_accepted(lane, event):
-    """Count an accepted step: nothing is being located any more."""
+def step_accepted(lane, event, turn):
+    """Count an accepted step; after several turns of memories without progress these rest."""
     lane.accepted += 1
     lane.last = lane.step
     lane.tries = lane.seeks = lane.returns = 0
+    lane.quiet = max(0, lane.quiet - 1)
     if not lane.across and lane.cross == 0.0:
         lane.misses = 0
     lane.events += event
+    if lane.step >= SHORT * lane.h:
+        lane.short = 0
+    elif turn and not lane.across:  # what else is located does not come back by rounding
+        lane.short += 1
+        if lane.short >= PATIENCE:
+            lane.short, lane.quiet = 0, REST
