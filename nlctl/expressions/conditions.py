@@ -160,7 +160,7 @@ def is_of_places(condition: Expr) -> bool:
 
 def _table_passed(condition: Expr) -> tuple[Expr, Expr] | None:
     """Return a table in increasing order, and the number that it is compared with; None of none."""
-    if condition.op in ORDERS and condition.size is not None:
+    if condition.op in ORDERS and (condition.size or 1) > 1:
         for table, number in (condition.args, condition.args[::-1]):
             if table.op == "table" and number.size is None:
                 return (table, number) if all(a < b for a, b in pairwise(table.data)) else None

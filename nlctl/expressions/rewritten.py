@@ -77,8 +77,9 @@ def _as_statements(tree: Definition) -> ast.FunctionDef:
     """Return a definition in statements: of a lambda that of a function which returns the same."""
     if isinstance(tree, ast.FunctionDef):
         return tree
-    body: list[ast.stmt] = [ast.copy_location(ast.Return(tree.body), tree.body)]
-    whole = ast.FunctionDef(_FOLLOWED, tree.args, body, [])
+    whole = ast.parse(f"def {_FOLLOWED}(): pass").body[0]  # it has all fields, in any Python
+    assert isinstance(whole, ast.FunctionDef)
+    whole.args, whole.body = tree.args, [ast.copy_location(ast.Return(tree.body), tree.body)]
     return ast.copy_location(whole, tree)
 
 

@@ -15,7 +15,7 @@ from ..reading import Reading
 from ..settings import Settings
 from .routine import series
 
-LEAST, MOST = 4, 30  # orders
+LEAST, MOST = 6, 30  # orders; of 4 and 5 steps are not followed to where fast conditions lie
 _COST = 0.2  # of a step of order 1, in explicit ones: measured, 1.1 to 1.9 at 8, 1.5 to 2.7 at 13
 
 

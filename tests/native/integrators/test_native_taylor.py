@@ -256,7 +256,7 @@ def test_the_error_follows_the_tolerance(rtol):
 
 
 def test_fixed_steps_converge_with_the_order_of_the_polynomial():
-    """Halving the step divides the error by 2^p: p = 5 for rtol = 1e-3."""
+    """Halving the step divides the error by 2^p: p = 6 for rtol = 1e-3."""
     compiled, p = autonomous(lambda t, x: [x[1], -np.sin(x[0])], 2), order_for(1e-3)
     exact = run(compiled, [0.0, 4.0], [1.0, 0.0], rtol=1e-13, atol=1e-14).states[:, -1]
     errors = [
