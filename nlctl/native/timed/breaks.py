@@ -63,9 +63,7 @@ def break_points(
     args = [arg for c in conditions for arg in c.args if arg.size is None]
     lines = as_lines(args, constant, span)
     jumps, until = [np.zeros(0)], [np.zeros(0)]
-    for condition in conditions:
-        if _follows(condition, conditions):
-            continue
+    for condition in (c for c in conditions if not _follows(c, conditions)):
         crossed, elements = _known(condition, lines), range(condition.size or 1)
         levels = [partial(_level, condition, k) for k in elements]
         nodes = needed([condition])
