@@ -98,14 +98,18 @@ def _candidates(self: Tracer, key: Any, place: int) -> tuple[Tracer, range]:
     keys = key if isinstance(key, tuple) else (key,)
     if any(k is None or k is ... for k in keys):
         raise Untraceable("new axes next to an integer that depends on the state")
-    chosen, length = keys[place], self.shape[place]
+    return keys[place], _places_of(self.graph, keys[place], self.shape[place])
+
+
+def _places_of(graph: Graph, chosen: Tracer, length: int) -> range:
+    """Return the places of a row that an integer may name; beyond is an error."""
     low, high = integer_range(chosen.only)
     first, last = max(low, -length), min(high, length - 1)
     if first > last:
         raise Untraceable("an integer that names no place")
-    guard(self.graph, chosen, "ge", first, low)
-    guard(self.graph, chosen, "le", last, high)
-    return chosen, range(int(first), int(last) + 1)
+    guard(graph, chosen, "ge", first, low)
+    guard(graph, chosen, "le", last, high)
+    return range(int(first), int(last) + 1)
 
 
 def guard(graph: Graph, chosen: Tracer, name: str, bound: float, possible: float) -> None:
@@ -162,11 +166,8 @@ def _of_list(graph: Graph, whole: Any, key: Any) -> Any:
         return python_number(graph, element.only) if types == {int} else element
     if not isinstance(key, Tracer) or _open_place(key) is None:
         return whole[key]
-    low, high = integer_range(key.only)
-    first, last = -len(whole) if low < 0 else 0, len(whole) - 1
-    guard(graph, key, "ge", first, low)
-    guard(graph, key, "le", last, high)
-    return whole[integer_followed(key, first, last)]
+    places = _places_of(graph, key, len(whole))
+    return whole[integer_followed(key, places[0], places[-1])]
 
 
 def _scattered(self: Tracer, key: object, place: int, value: object) -> None:

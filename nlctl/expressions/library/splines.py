@@ -16,7 +16,13 @@ from ..operators import elementwise
 from . import scattered
 from .surfaces import surface
 from .table import enter
-from .tables import constant_cells, interval_choice, interval_polynomial, polynomial
+from .tables import (
+    beyond_ends,
+    constant_cells,
+    interval_choice,
+    interval_polynomial,
+    polynomial,
+)
 
 
 def called_object(graph: Graph, interpolant: object, *arguments: object, **options: object) -> Any:
@@ -103,7 +109,11 @@ def piecewise_polynomial(
     def at(e: Expr) -> Expr:
         value = interval_polynomial(graph, e, breaks, coefficients.T)
         nan = graph.const(np.nan)
-        return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
+        return (
+            value
+            if extrapolate
+            else beyond_ends(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
+        )
 
     return _elementwise(graph, x, at)
 
@@ -124,14 +134,6 @@ def _in_columns(
     places = range(cells.ndim - 1)  # the axes of x come where that of the samples has been
     cells = cells.reshape(cells.shape[:-1] + shape)
     return Tracer(graph, np.moveaxis(cells, places, [axis + k for k in places]))
-
-
-def _beyond(
-    graph: Graph, x: Expr, ends: Sequence[Any], inside: Expr, below: Expr, above: Expr
-) -> Expr:
-    """Return what is inside of a range, and other values beyond its ends."""
-    inside = graph.op("select", graph.op("gt", x, graph.const(float(ends[-1]))), above, inside)
-    return graph.op("select", graph.op("lt", x, graph.const(float(ends[0]))), below, inside)
 
 
 def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
@@ -183,7 +185,7 @@ def splev(graph: Graph, x: object, tck: Any, der: int = 0, ext: int = 0) -> Any:
     edges = [0.0, 0.0] if ext == 1 else [float(spline(e, der)) for e in ends]
     below, above = map(graph.const, edges)
     cells = mapped(
-        lambda e, f: _beyond(graph, graph.number(e), ends, f, below, above),
+        lambda e, f: beyond_ends(graph, graph.number(e), ends, f, below, above),
         array.elements(), values.elements(),
     )  # fmt: skip
     return Tracer(graph, cells)
@@ -235,7 +237,7 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
             _guard_range(graph, e, ends)
         if extrapolates or below is None or above is None:
             return value
-        return _beyond(graph, e, ends, value, below, above)
+        return beyond_ends(graph, e, ends, value, below, above)
 
     return _elementwise(graph, x, at)
 
@@ -331,7 +333,7 @@ def _on_grid(
             _guard_range(graph, e, ends)
         elif interpolant.fill_value is not None:
             fill = graph.const(float(interpolant.fill_value))
-            value = _beyond(graph, e, ends, value, fill, fill)
+            value = beyond_ends(graph, e, ends, value, fill, fill)
     return value
 
 

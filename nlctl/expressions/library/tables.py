@@ -24,10 +24,13 @@ MOST_PIECES = 256
 
 def _constants(graph: Graph, values: object, what: str) -> np.ndarray:
     """Return what must be known when a function is traced."""
-    array = constant_value(traced(graph, values))
-    if isinstance(array, Tracer) or np.ndim(array) != 1:
+    return _row(constant_value(traced(graph, values)), what)
+
+
+def _row(known: Any, what: str) -> np.ndarray:
+    if isinstance(known, Tracer) or np.ndim(known) != 1:
         raise Untraceable(f"{what} that depend on the state or on parameters")
-    return np.asarray(array, dtype=float)
+    return np.asarray(known, dtype=float)
 
 
 def constant_cells(graph: Graph, values: np.ndarray) -> Any:
@@ -91,9 +94,10 @@ def interp(
     period: object = None,
 ) -> Tracer:
     """Return a piecewise linear function, its ends beyond the table."""
-    if period is None and isinstance(constant_value(traced(graph, xp)), Tracer):
-        return _of_open_table(graph, x, (traced(graph, xp), traced(graph, fp)), (left, right))
-    places = _constants(graph, xp, "places of a table")
+    known = constant_value(traced(graph, xp))
+    if period is None and isinstance(known, Tracer):
+        return _of_open_table(graph, x, (known, traced(graph, fp)), (left, right))
+    places = _row(known, "places of a table")
     given = constant_value(traced(graph, fp))
     is_open = isinstance(given, Tracer)
     values: Any = [graph.number(e) for e in given.elements()] if is_open else given
@@ -127,8 +131,16 @@ def _linear(
     pieces = zip(slopes, values, strict=False)
     value = interval_polynomial(graph, x, places, pieces) if places.size > 1 else last
     value = op("select", op("eq", x, const(float(places[-1]))), last, value)
-    value = op("select", op("gt", x, const(float(places[-1]))), right, value)
-    return op("select", op("lt", x, const(float(places[0]))), left, value)
+    return beyond_ends(graph, x, (places[0], places[-1]), value, left, right)
+
+
+def beyond_ends(
+    graph: Graph, x: Expr, ends: Sequence[Any], inside: Expr, below: Expr, above: Expr
+) -> Expr:
+    """Return what is inside of a range, and other values beyond its ends."""
+    first, last = _number(graph, ends[0]), _number(graph, ends[-1])
+    inside = graph.op("select", graph.op("gt", x, last), above, inside)
+    return graph.op("select", graph.op("lt", x, first), below, inside)
 
 
 def _of_open_table(
@@ -153,9 +165,9 @@ def _of_open_table(
         )
         slope = op("div", op("sub", f_1, f_0), op("sub", x_1, x_0))
         value = op("add", op("mul", slope, op("sub", x, x_0)), f_0)
-        value = op("select", op("ge", x, xs[-1].only), fs[-1].only, value)
-        value = op("select", op("gt", x, xs[-1].only), above, value)
-        return op("select", op("lt", x, xs[0].only), below, value)
+        first, last = xs[0].only, xs[-1].only
+        value = op("select", op("ge", x, last), fs[-1].only, value)
+        return beyond_ends(graph, x, (first, last), value, below, above)
 
     return Tracer(graph, mapped(at, traced(graph, x).elements()))
 

@@ -20,7 +20,7 @@ _COST = 0.2  # of a step of order 1, in explicit ones: measured, 1.1 to 1.9 at 8
 
 
 def order_for(rtol: float) -> int:
-    """Return the order of Taylor's method for a tolerance: 1 - ln(rtol) / 2, rounded up.
+    """Return the order of Taylor's method for a tolerance: 1 - ln(rtol) / 2, rounded up; 6 or more.
 
     With it the work per unit of time is least for long steps of a given part of the radius of
     convergence: A. Jorba, M. Zou, Experimental Mathematics 14:99 (2005).
