@@ -60,6 +60,7 @@ def input_output_response(
     max_steps: int | None = None,
     max_step: float | None = None,
     step: float | None = None,
+    slide: bool = True,
     stop_when: Callable[..., Any] | None = None,
     events: WatchedEvents | None = None,
     progress: Callable[[float], object] | None = None,
@@ -132,6 +133,11 @@ def input_output_response(
         Longest step of the integrator (s).
     step : float, optional
         Machine code: a fixed step in s; 0 for error control.
+    slide : bool, optional
+        Machine code: whether a run that comes back to a condition of the equations from both sides
+        goes along it, as Filippov's solution does, with the convex combination of both sides'
+        rates and outputs that keeps it there.  ``statistics.slides`` says where one has.  With
+        False such a run ends with a ChatteringError.
     stop_when : callable, optional
         ``stop_when(t, x, u, params)``, a number: of the time, all states, the diagram's inputs
         and the overrides of the run.  Where it changes its sign the run ends; that instant is the
@@ -158,7 +164,8 @@ def input_output_response(
     DivergedError
         If the state becomes infinite or NaN, or an event function NaN.
     ChatteringError
-        If a run switches over and over again at a jump; the message names the block.
+        If a run switches over and over again at a jump along which it cannot slide; the message
+        names the block.
     ZenoError
         If jumps follow each other ever faster.
     KeyboardInterrupt
@@ -214,6 +221,7 @@ def input_output_response(
         solver={
             **{"method": method, "rtol": rtol, "atol": atol, "max_steps": max_steps, "step": step},
             "max_step": max_step,
+            "slide": slide,
             **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
         },
         watched=watched_functions(stop_when, events),

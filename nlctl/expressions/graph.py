@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from .limits import within_limits
 from .signs import sign_of
 
 SMALL = 8  # arrays up to this size are numbers of their own, longer ones are loops
@@ -394,7 +395,7 @@ class Graph:
             return size if np.copysign(1.0, b.data) > 0.0 else self.op("neg", size)
         if name == "sub" and is_const[0] and a.data == 0.0:
             return self.op("neg", b)
-        return a.args[0] if name == "neg" and a.op == "neg" else None
+        return a.args[0] if name == "neg" and a.op == "neg" else within_limits(self, name, a, b)
 
     def _choice_of_pieces(self, condition: Expr, a: Expr, b: Expr) -> Expr | None:
         """Choose piece by piece: what is the same on both ways depends on no condition."""
@@ -407,9 +408,7 @@ class Graph:
         """Choose between two operations that differ in one argument by choosing that."""
         if a.op != b.op or a.data is not None or a.op in ("const", "sum", "concat"):
             return None
-        places = [
-            i for i, pair in enumerate(zip(a.args, b.args, strict=True)) if pair[0] != pair[1]
-        ]
+        places = [i for i, (x, y) in enumerate(zip(a.args, b.args, strict=True)) if x is not y]
         if len(places) != 1:
             return None
         (i,) = places

@@ -36,6 +36,7 @@ from .machine.routine import entries_of
 from .results import Statistics, Trajectory, at_its_end, made
 from .run import Run
 from .settings import METHODS, Settings
+from .slid import slid_instead
 from .spare import give_back, workspace
 from .taylor.method import with_taylor
 from .taylor.turns import turned, with_turns
@@ -64,21 +65,28 @@ class Course:
 def trajectory(
     course: Course, x0: np.ndarray, p: np.ndarray, progress: Callable[[float], object] | None = None
 ) -> Trajectory:
-    """Run one member; again, with functions called of which a loop takes too many passes."""
-    reached = run_once(course, x0, p, progress)
-    return called_instead(course, reached, x0, p, progress) if reached.cut else reached
+    """Run one member; see `followed_up`."""
+    return followed_up(course, run_once(course, x0, p, progress), x0, p, progress)
 
 
-def called_instead(
+def followed_up(
     course: Course,
-    cut_short: Trajectory,
+    reached: Trajectory,
     x0: np.ndarray,
     p: np.ndarray,
     progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
-    """Run one member again, with the functions called that have cut it short."""
-    compiled, cut = course.compiled, cut_short.cut
-    again = run_once(replace(course, compiled=compiled.calling(cut)), x0, p, progress)
+    """Return a run; again, with functions called that have cut it short, or where it slides."""
+
+    def run(compiled: Compiled, x0: np.ndarray, p: np.ndarray) -> Trajectory:
+        return run_once(replace(course, compiled=compiled), x0, p, progress)
+
+    if reached.statistics.jump is not None and course.settings.slide:
+        return slid_instead(run, course.compiled, reached, (x0, p), float(np.ptp(course.times)))
+    if not reached.cut:
+        return reached
+    compiled, cut = course.compiled, reached.cut
+    again = run(compiled.calling(cut), x0, p)
     called = described_functions(compiled.schedule, cut)
     return replace(again, cut=cut, statistics=replace(again.statistics, called=called))
 

@@ -36,7 +36,7 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
-from .driver import Course, begin, called_instead, finish, prepared, trajectory, watched
+from .driver import Course, begin, finish, followed_up, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike, SignalsByName
 from .floats import as_given
 from .happened import happened
@@ -67,6 +67,7 @@ def ensemble_response(
     atol: float = ATOL,
     max_steps: int = 1_000_000,
     max_step: float | None = None,
+    slide: bool = True,
     method: str | Tableau | None = None,
     hold: str = "foh",
     progress: Callable[[int], object] | None = None,
@@ -112,9 +113,11 @@ def ensemble_response(
         Tolerances of the integrator: relative (1), and absolute in the states' units.
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT, one that switches over and
-        over again at a jump with CHATTERING.
+        over again at a jump along which it cannot slide with CHATTERING.
     max_step : float, optional
         Longest step of the integrator (s), the same for all members.
+    slide : bool, optional
+        As in `nlctl.input_output_response`: whether members go along conditions.
     method : str or Tableau, optional
         As in `nlctl.input_output_response`.
     hold : {"foh", "zoh"}, optional
@@ -170,7 +173,9 @@ def ensemble_response(
     _check_signals(compiled, keep, metrics)
     if max_step is not None:
         checked_number("ensemble_response", "max_step", max_step, above=0)
-    settings = settings_of(method, rtol=rtol, atol=atol, max_steps=max_steps, max_step=max_step)
+    settings = settings_of(
+        method, rtol=rtol, atol=atol, max_steps=max_steps, max_step=max_step, slide=slide
+    )
     grid, u = times, input_array(compiled.system, given["inputs"], times)
     if hold == "zoh" and ct.isctime(compiled.system) and u.size:
         grid, u = held(times, u)
@@ -299,8 +304,7 @@ def _group(every: Members, numbers: range, course: Course, stop: Event) -> Itera
             yield trajectory(course, x0[:, j], p[:, j])
         else:
             member = replace(made(run, outputs, j), happened=happened(compiled, run, j))
-            cut = (course, member, x0[:, j], p[:, j])
-            yield called_instead(*cut) if member.cut else member
+            yield followed_up(course, member, x0[:, j], p[:, j])
 
 
 def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Run, np.ndarray]:

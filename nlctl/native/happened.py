@@ -55,7 +55,11 @@ def _labelled(compiled: Compiled, conditions: Conditions) -> list[tuple[str, str
     nodes = compiled.schedule.nodes
     for node in nodes:
         count = count_switching_functions(node)
-        labels += [(node.path, name) for name in numbered("switching", count)]
+        names = numbered("switching", count)
+        if node.slide is not None:
+            what = node.slide.what[1]
+            names = [what, *[f"{what}: end of sliding"] * (count - 1)]
+        labels += [(node.path, name) for name in names]
     for each in conditions.located:
         what: str = each.what
         names = numbered(_WORDS.get(what, what), each.rows)

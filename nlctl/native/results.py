@@ -38,6 +38,9 @@ class Statistics:
     turns: int = 0
     # Functions that were called, not written out, since a loop in them took too many passes.
     called: tuple[str, ...] = ()
+    # Conditions of the equations along which it has slid, as Filippov's solutions do: it has come
+    # back to them from both sides, and was run again with an ideal relay for each.
+    slides: tuple[str, ...] = ()
     rtol: float = np.nan  # Tolerances of steps; none in discrete time.
     atol: float = np.nan
 

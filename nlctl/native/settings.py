@@ -56,6 +56,7 @@ class Settings:
     method: str | Tableau = "auto"
     step: float = 0.0  # fixed step (s) instead of error control; 0 for error control
     max_step: float = np.inf  # longest step (s), under error control too
+    slide: bool = True  # whether a run that chatters at a condition slides along it
 
     @property
     def pair(self) -> Tableau:
@@ -78,6 +79,8 @@ class Settings:
                 raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
         if not 0 <= self.step < np.inf:
             raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
+        if not isinstance(self.slide, bool | np.bool_):
+            raise ParameterError(f"slide must be True or False, got {self.slide!r}")
         if not self.max_step > 0:
             raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
         if self.max_steps < 1:

@@ -15,7 +15,7 @@ from ..delays import TransportDelay
 from ..native import Compiled
 from ..native.diagram.nodes import Node
 from ..native.diagram.parameters import Slot, length
-from ..native.diagram.schedule import Schedule
+from ..native.diagram.schedule import Schedule, stand_in
 from ..native.diagram.wiring import Signal
 from ..native.histories import direct_lines
 
@@ -97,24 +97,6 @@ class Extended:
     def slot(self, name: str) -> Slot:
         """Return the place of a parameter of this."""
         return self.layout[self.owner][name]
-
-
-def stand_in(system: ct.NonlinearIOSystem, states: int, outputs: int) -> Any:
-    """Return a system that says how many states and outputs a program has."""
-    return ct.NonlinearIOSystem(
-        _nothing,
-        _nothing,
-        name=system.name,
-        states=states,
-        inputs=system.ninputs or 0,
-        outputs=outputs,
-        dt=system.dt,
-    )
-
-
-def _nothing(t: float, x: object, u: object, params: object) -> Any:
-    """What a system computes that only says how large it is."""
-    return np.zeros(0)
 
 
 def extended(compiled: Compiled, outputs: Sequence[Any], by: int, sent: Sent) -> Extended:

@@ -13,6 +13,16 @@ from .wiring import Combination
 
 
 @dataclass(frozen=True, kw_only=True)
+class Slide:
+    """Conditions that change at one place, and at which runs slide: a node stands for them."""
+
+    what: tuple[str, str]  # block and name of the first
+    places: tuple[int, ...]  # of them among the located conditions
+    # of each comparison that changes there, what it is where the first's function is below 0, above
+    sides: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Node:
     """One block of the schedule."""
 
@@ -27,6 +37,7 @@ class Node:
     numba_differs: tuple[str, ...] = ()
     messages: tuple[Message, ...] = ()  # that its functions write: they are traced or refused
     called: frozenset[str] = frozenset()  # kinds of its functions that are not to be traced
+    slide: Slide | None = None  # of the ideal relay that stands for a condition: what for
     # what samples the block, whose states are the first ones of this
     sampled: Sampled | None = None
 

@@ -164,6 +164,24 @@ def during(read: Schedule, what: Happening) -> Schedule:
         ) from None
 
 
+def stand_in(system: ct.NonlinearIOSystem, states: int, outputs: int) -> Any:
+    """Return a system that says how many states and outputs a program has."""
+    return ct.NonlinearIOSystem(
+        _nothing,
+        _nothing,
+        name=system.name,
+        states=states,
+        inputs=system.ninputs or 0,
+        outputs=outputs,
+        dt=system.dt,
+    )
+
+
+def _nothing(t: float, x: object, u: object, params: object) -> Any:
+    """What a system computes that only says how large it is."""
+    return np.zeros(0)
+
+
 def _equations_of(system: System) -> Iterator[Captured]:
     """Yield notes of what a block or diagram consists of: it may be changed later."""
     for name in ("connect_map", "input_map", "output_map", "updfcn", "outfcn", *"ABCD"):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...blocks import supplied_of
 from ...errors import CompileError
-from ...expressions.arrays import Tracer, concatenated, leaf_vector
+from ...expressions.arrays import Tracer, concatenated, full, leaf_vector
 from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
 from ...expressions.trace import trace
 from ...responses.watched import watches_nan
@@ -29,6 +29,7 @@ from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
 from .reader import Reader, vector_of
 from .relays import with_sliding
+from .slides import with_slides
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +77,7 @@ def equations(
     reader = Reader(
         graph=graph, layout=layout, blocks=schedule.nodes, p=p,
         samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
-        supplied=_behind_delays(graph, schedule),
+        supplied=_behind_delays(graph, schedule) | _of_slides(graph, schedule),
     )  # fmt: skip
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
         reader = with_sliding(reader, schedule)
@@ -104,6 +105,7 @@ def equations(
             then = replace(reader, blocks=at_instant.nodes, what=what, signals={}, solved=[])
             then.read(at_instant)
             results |= then.all_known({f"sample{k}": _next(then)})
+        results, switches = with_slides(reader, schedule, results, switches)
     return Equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
         fixed_points=reader.fixed_points, conditions=switches, cut=frozenset(reader.cut),
@@ -119,6 +121,12 @@ def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
             shape = (schedule.nodes[i].system.noutputs,)
             signals[i] = leaf_vector(graph, "u", first + k, shape)
     return signals
+
+
+def _of_slides(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
+    """Return outputs of relays that stand for conditions: no signal is made of them."""
+    places = [i for i, node in enumerate(schedule.nodes) if node.slide is not None]
+    return {i: full(graph, 1, 0.0) for i in places}
 
 
 def _conditions(
@@ -223,5 +231,6 @@ def _states_now(reader: Reader, schedule: Schedule, become: Mapping[int, Tracer]
     for place in sorted(known):
         parts += [leaf_vector(graph, "x", at, (place - at,)), known[place]]
         at = place + 1
-    rest = leaf_vector(graph, "x", at, ((schedule.system.nstates or 0) - at,))
+    slides = sum(node.slide is not None for node in reader.blocks)  # no states of the diagram
+    rest = leaf_vector(graph, "x", at, ((schedule.system.nstates or 0) - slides - at,))
     return concatenated(graph, [*parts, rest])

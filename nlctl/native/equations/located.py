@@ -135,7 +135,7 @@ def found_conditions(
     moving = needed(roots)
     nodes = needed([*roots, *watched]) if watched else moving
     timed, inside = _of_time(nodes), set(nodes)
-    known = {_key(e) for e in _pieces(declared)}
+    known = {sign_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
     of_time: dict[Expr, tuple[Expr, ...]] = {}
     rows, count, beyond = 0, 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
@@ -227,7 +227,7 @@ def _entered(
     """Enter a condition by its switching functions; return all rows, and how many are too many."""
     beyond = 0
     for function, side in functions:
-        key, size = _key(function), function.size or 1
+        key, size = sign_key(function), function.size or 1
         if key in located:
             located[key] = replace(located[key], bends=condition.bends and located[key].bends)
             continue
@@ -236,7 +236,7 @@ def _entered(
         size *= side >= 0  # of two functions of integers one counts
         if rows + size > _MOST:
             beyond += size
-        elif size or _key(functions[0][0]) in located:
+        elif size or sign_key(functions[0][0]) in located:
             located[key] = replace(condition, function=function, integers=side)
             rows += size
     return rows, beyond
@@ -322,7 +322,7 @@ def _is_of_nlctl(node: Node) -> bool:
     return isinstance(system, Block) and type(system.spec).__module__.startswith("nlctl.")
 
 
-def _key(function: Expr) -> object:
+def sign_key(function: Expr) -> object:
     """Return what is the same for functions that change their signs together."""
     while function.op == "neg":
         function = function.args[0]

@@ -225,11 +225,14 @@ class Reader:
             return self._linear(node, system.A, system.B, inputs)
         return self._function(i, "update", [system.updfcn], inputs, system.nstates)
 
-    def events(self, i: int) -> Tracer:
+    def events(self, i: int, given: Tracer | None = None) -> Tracer:
+        """Return what a block declares, and what its memories become; of what it may be given."""
         node, spec = self.blocks[i], self.blocks[i].system.spec
         used = [("switching", count_switching_functions(node)), ("commit", len(memory(node)))]
         functions = [getattr(spec, name) for name, count in used if count]
-        inputs = self.wired(node.inputs)
+        if node.slide is not None and given is None:  # it follows from all others
+            return full(self.graph, sum(count for _, count in used), 0.0)
+        inputs = self.wired(node.inputs) if given is None else given
         if i in self.moving:
             inputs = concatenated(self.graph, [inputs, self.moving[i]])
         values = self._function(i, "events", functions, inputs, sum(count for _, count in used))

@@ -19,8 +19,9 @@ from .reader import Reader, vector_of
 
 
 def relay_places(blocks: Sequence[Node]) -> list[int]:
-    """Return the numbers of the blocks that are ideal relays."""
-    return [i for i, node in enumerate(blocks) if supplied_of(node.system) is SLIDING]
+    """Return the numbers of the blocks that are ideal relays, and stand for no condition."""
+    relays = (i for i, node in enumerate(blocks) if supplied_of(node.system) is SLIDING)
+    return [i for i in relays if blocks[i].slide is None]
 
 
 def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
@@ -47,7 +48,7 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
             name=blocks[i].path,
             leaf=leaf,
             given=first.wired(blocks[i].inputs)[0].only,
-            limits=_limits(first, i),
+            limits=limits_of(first, i),
         )
         for i, leaf in zip(places, leaves, strict=True)
     ]
@@ -72,7 +73,7 @@ def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
     return concatenated(graph, [vector_of(graph, part) for part in parts])
 
 
-def _limits(reader: Reader, i: int) -> Limits:
+def limits_of(reader: Reader, i: int) -> Limits:
     """Return the parameters of a relay, as expressions."""
     given = traced_parameters(reader.graph, reader.blocks[i].system, reader.layout[i], reader.p)
     names = (f.name for f in fields(Limits))

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks import supplied_of
 from ...errors import ParameterError
 from ...expressions.dependence import reads
+from ...sliding.relay import SLIDING
 from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.plan import Store
 from ..codegen.rewrite import rewritten
 from ..diagram.parameters import length
-from ..equations.relays import relay_places
 from ..integrate.memory import zeros
 from ..lower import Lowered, planned, stores_of
 from ..machine.finish import finished
@@ -69,7 +70,7 @@ def _check(reading: Reading) -> None:
         raise ParameterError(
             f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
         )
-    relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
+    relays = [node.path for node in schedule.nodes if supplied_of(node.system) is SLIDING]
     if relays:
         raise ParameterError(
             f"'{name}' has an ideal relay ('{relays[0]}'), which method='taylor' does not "

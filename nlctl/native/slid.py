@@ -1,0 +1,255 @@
+"""A run again that has chattered at conditions of its equations, with these as ideal relays.
+
+Where a run comes back to a condition with each of its shortest steps, it is looked at around that
+place: on which side of which switching function what compares has which value, and whether the
+equations are then, on each side, those in which these values are constants.  If so the diagram is
+read with a relay for the condition, see `equations.slides`, and the run is repeated from its start,
+until it chatters no longer, or at something else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..blocks import block
+from ..errors import CompileError, ParameterError
+from ..expressions.evaluate import evaluate_expressions
+from ..expressions.graph import Expr, Graph, Untraceable
+from ..sliding import IdealRelay
+from .chattering.steps import Jump
+from .compiled import Compiled
+from .diagram.nodes import Node, Slide
+from .diagram.parameters import length, slots_of
+from .diagram.program import count_switching_functions, memory
+from .diagram.schedule import stand_in
+from .equations.blocks import Equations
+from .equations.slides import changing_at, of_both_sides
+from .happened import row_labels
+from .results import Trajectory
+
+MOST = 8  # conditions of one run that slide
+_AROUND = 64  # points
+_RATE = 10.0  # at which what is left of a switching function decays, times the run's length
+_REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slid:
+    """A diagram with ideal relays for some conditions of its equations."""
+
+    slides: tuple[Slide, ...]
+    compiled: Compiled
+
+
+def slides_at(
+    compiled: Compiled, p: np.ndarray, jump: Jump, scale: np.ndarray
+) -> list[tuple[Slide, float]]:
+    """Return conditions that explain a jump, each with how far its function is from 0 around it."""
+    # `scale` (nstates,): by how much each state may be off.
+    if jump.goes_on or jump.is_rough:
+        return []
+    read = compiled.equations_with(p)
+    around = _Around(compiled=compiled, read=read, arrays=_points(compiled, p, jump, scale))
+    try:
+        return around.slides()
+    except Untraceable:  # there is what is called unchanged
+        return []
+
+
+def _points(
+    compiled: Compiled, p: np.ndarray, jump: Jump, scale: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return times, states, inputs and parameters around a jump."""
+    still = [*compiled.program.memory, *compiled.program.sampled]
+    rng = np.random.default_rng(1)
+    way = np.subtract(jump.after, jump.before)[:, None] * rng.uniform(size=_AROUND)
+    moves = way + rng.uniform(-1.0, 1.0, way.shape) * scale[:, None]
+    moves[still] = 0.0
+    x = np.where(moves == 0.0, jump.after[:, None], jump.before[:, None] + moves)
+    return {"t": np.array([[jump.time]]), "x": x, "u": jump.inputs[:, None], "p": p[:, None]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Around:
+    """The equations at points around a jump."""
+
+    compiled: Compiled
+    read: Equations
+    arrays: dict[str, np.ndarray]
+
+    @property
+    def graph(self) -> Graph:
+        return self.read.graph
+
+    def values(self, exprs: Sequence[Expr]) -> np.ndarray:
+        """Return values of expressions at all points, those of vectors one below the other."""
+        values = evaluate_expressions(exprs, self.arrays)
+        shapes = ((e.size or 1, _AROUND) for e in exprs)
+        return np.concatenate([np.zeros((0, _AROUND)), *map(np.broadcast_to, values, shapes)])
+
+    def slides(self) -> list[tuple[Slide, float]]:
+        """Return the conditions at which the rates jump, and nothing else does around it."""
+        located = self.read.conditions.located
+        single = [k for k, one in enumerate(located) if not one.bends and one.function.size is None]
+        functions = self.values([located[k].function for k in single])
+        both = [(k, s) for k, s in zip(single, functions, strict=True) if _has_both_signs(s)]
+        groups: list[list[tuple[int, np.ndarray]]] = []
+        for k, s in both:
+            alike = next((g for g in groups if _changes_with(g[0][1], s)), None)
+            if alike is None:
+                groups.append([(k, s)])
+            else:
+                alike.append((k, s))
+        slides = map(self._slide, groups)
+        return [slide for slide in slides if slide is not None]
+
+    def _slide(self, group: Sequence[tuple[int, np.ndarray]]) -> tuple[Slide, float] | None:
+        """Return a slide of conditions that change together, if rates jump there as it has them."""
+        located, s = self.read.conditions.located, group[0][1]
+        every = [e for name in self.read.results for e, _ in self.read.pieces(name)]
+        every += [e for part in self.read.fixed_points.values() for e in part]
+        function = located[group[0][0]].function
+        changing = changing_at(self.graph, every, [located[k].function for k, _ in group])
+        sides = [_sides(values, s) for values in self.values(changing)]
+        if None in sides:
+            return None
+        sides = tuple(one for one in sides if one)
+        rates = [e for name in ("dx", "y") for e, _ in self.read.pieces(name)]
+        both = of_both_sides(self.graph, rates, changing, sides, function)
+        now, below, above = map(self.values, (rates, *both))
+        if np.array_equal(below, above) or not np.array_equal(now, np.where(s < 0.0, below, above)):
+            return None
+        labels = row_labels(self.compiled, self.read.conditions)
+        row = self.compiled.program.switching + sum(one.rows for one in located[: group[0][0]])
+        slide = Slide(what=labels[row], places=tuple(k for k, _ in group), sides=sides)
+        return slide, float(np.abs(s).max())
+
+
+def _has_both_signs(s: np.ndarray) -> bool:
+    return bool(np.all(s != 0.0) and s.min() < 0.0 < s.max())
+
+
+def _changes_with(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two functions have equal or opposite signs at all points."""
+    return abs(int(np.sum(np.sign(one) * np.sign(other)))) == one.size
+
+
+def _sides(values: np.ndarray, s: np.ndarray) -> tuple[float, float] | None:
+    """Return the one value that a comparison has below, and that above; None if it has several."""
+    below, above = np.unique(values[s < 0.0]), np.unique(values[s > 0.0])
+    return (float(below[0]), float(above[0])) if below.size == above.size == 1 else None
+
+
+def slid_instead(
+    run: Callable[[Compiled, np.ndarray, np.ndarray], Trajectory],
+    compiled: Compiled,
+    reached: Trajectory,
+    start: tuple[np.ndarray, np.ndarray],
+    span: float,
+) -> Trajectory:
+    """Return a run that chatters no longer, if relays can stand for the conditions of that."""
+    # `run` has a diagram, an initial state and a parameter vector.
+    x0, p = start
+    slides: list[tuple[Slide, float]] = []
+    again, diagram, whole = reached, compiled, p
+    while (jump := again.statistics.jump) is not None and len(slides) < MOST:
+        done = again.statistics
+        scale = done.atol + done.rtol * np.maximum(np.abs(jump.before), np.abs(jump.after))
+        more = slides_at(diagram, whole, jump, scale)
+        more = [(_counted(slide, slides), far) for slide, far in more]
+        if not more:
+            break
+        try:
+            diagram = with_relays(compiled, tuple(slide for slide, _ in [*slides, *more]), p)
+            whole = _parameters(diagram, p, [far for _, far in [*slides, *more]], span)
+            further = run(diagram, np.append(x0, np.zeros(len(slides) + len(more))), whole)
+        except (CompileError, ParameterError):
+            break
+        if not further.statistics.time > done.time:
+            break
+        again = further
+        slides += more
+    return _of_diagram(again, x0.size, compiled.schedule.ninputs, [one for one, _ in slides])
+
+
+def _counted(slide: Slide, before: Sequence[tuple[Slide, float]]) -> Slide:
+    """Return a slide with places among all conditions, of one among those that were left."""
+    gone = {place for one, _ in before for place in one.places}
+    every = [k for k in range(max(slide.places) + len(gone) + 1) if k not in gone]
+    return replace(slide, places=tuple(every[place] for place in slide.places))
+
+
+def with_relays(compiled: Compiled, slides: tuple[Slide, ...], p: np.ndarray) -> Compiled:
+    """Return a diagram with ideal relays for conditions, made when it is first needed."""
+    slid = compiled.cache.found(
+        Slid, lambda each: each.slides == slides, lambda: _read_with(compiled, slides)
+    ).compiled
+    _ = slid.equations_with(p)  # refused now if they act on each other
+    return slid
+
+
+def _read_with(compiled: Compiled, slides: tuple[Slide, ...]) -> Slid:
+    read, program = compiled.schedule, compiled.program
+    n, count = read.system.nstates or 0, len(read.nodes)
+    nodes = [_relay(slide, n + k) for k, slide in enumerate(slides)]
+    at, layout = length(program.layout), {i: program.layout[i] for i in range(count)}
+    for k, node in enumerate(nodes):
+        layout[count + k] = slots_of(node.system, node.path, at)
+        at += sum(slot.size for slot in layout[count + k].values())
+    later = {i + len(nodes): i for i in range(count, count + len(read.samplings))}
+    layout |= {i: program.layout[before] for i, before in later.items()}
+    schedule = replace(
+        read, nodes=(*read.nodes, *nodes), order=(*read.order, *range(count, count + len(nodes))),
+        unknown=(*read.unknown, *[frozenset[int]()] * len(nodes)),
+        system=stand_in(read.system, n + len(nodes), read.system.noutputs or 0),
+    )  # fmt: skip
+    moved = {i: program.fixed[before] for i, before in later.items() if before in program.fixed}
+    whole = replace(
+        program, layout=layout, fixed={i: v for i, v in program.fixed.items() if i < count} | moved,
+        switching=program.switching + sum(map(count_switching_functions, nodes)),
+        memory=(*program.memory, *(m for node in nodes for m in memory(node))),
+    )  # fmt: skip
+    slid = replace(compiled, schedule=schedule, program=whole, original=None, apart=None)
+    return Slid(slides=slides, compiled=slid)
+
+
+def _relay(slide: Slide, state: int) -> Node:
+    """Return an ideal relay that stands for a condition; what it is given is no signal."""
+    name = f"{slide.what[0]}_slides"
+    return Node(
+        path=slide.what[0], system=block(IdealRelay(), name), state_offset=state, inputs=({},),
+        direct=np.zeros((1, 1), dtype=bool), slide=slide,
+    )  # fmt: skip
+
+
+def _parameters(slid: Compiled, p: np.ndarray, far: Sequence[float], span: float) -> np.ndarray:
+    """Return all parameters, with those of relays by how far functions are from 0 at rest."""
+    whole = np.append(p, np.zeros(length(slid.program.layout) - p.size))
+    places = [i for i, node in enumerate(slid.schedule.nodes) if node.slide is not None]
+    for i, rest in zip(places, far, strict=True):
+        values = {
+            "height": 1.0, "rest": rest, "rate": _RATE / span, "rest_rate": _REST_RATE * rest,
+        }  # fmt: skip
+        for name, value in values.items():
+            whole[slid.program.layout[i][name].offset] = value
+    return whole
+
+
+def _of_diagram(run: Trajectory, states: int, inputs: int, slides: Sequence[Slide]) -> Trajectory:
+    """Return a run of a diagram with relays without what is theirs."""
+    if not slides:
+        return run
+    done, jump = run.statistics, run.statistics.jump
+    if jump is not None:
+        jump = replace(
+            jump, before=jump.before[:states], after=jump.after[:states],
+            inputs=jump.inputs[:inputs], crowd=None,
+        )  # fmt: skip
+    names = tuple(f"{what} of block '{name}'" for name, what in (one.what for one in slides))
+    return replace(
+        run, states=run.states[:states], inputs=run.inputs[:inputs],
+        statistics=replace(done, jump=jump, slides=names),
+    )  # fmt: skip
