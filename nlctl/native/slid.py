@@ -217,7 +217,7 @@ def _read_with(compiled: Compiled, slides: tuple[Slide, ...]) -> Slid:
 
 
 def _relay(slide: Slide, state: int) -> Node:
-    """Return an ideal relay that stands for a condition; what it is given is no signal."""
+    """Return an ideal relay that stands for a condition, and has no signals."""
     name = f"{slide.what[0]}_slides"
     return Node(
         path=slide.what[0], system=block(IdealRelay(), name), state_offset=state, inputs=({},),

@@ -80,8 +80,8 @@ class IdealRelay:
 
     It runs in machine code.  `nlctl.compile` refuses it where u jumps with v, where v enters u'
     in another way, where u depends on a delayed signal, whose rate nobody knows, and where
-    several such relays act on each other's u'.  Inputs of the diagram have the rates of a run, in
-    which they are linear between its times.
+    several such relays act on each other's u' otherwise than as a + B v.  Inputs of the diagram
+    have the rates of a run, in which they are linear between its times.
 
     Examples
     --------

@@ -271,17 +271,22 @@ class TestJumps:
         np.testing.assert_allclose(of_plant(made)[0], self.exact, rtol=0, atol=1e-6)
 
 
-def cascade(coupling):
+def one_way(t, x, u, p):
+    return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1]])
+
+
+def both_ways(t, x, u, p):
+    return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1] - 0.1 * u[0]])
+
+
+def by_product(t, x, u, p):
+    return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1] - 0.1 * u[0] * u[1]])
+
+
+def cascade(update):
     """Two integrators with a relay each; the second relay acts on the first one, too."""
-
-    def update(t, x, u, p):
-        return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1]])
-
-    def both(t, x, u, p):
-        return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1] - 0.1 * u[0]])
-
     names = {"inputs": ["v1", "v2"], "outputs": ["u1", "u2"], "name": "plant", "states": 2}
-    middle = ct.nlsys(both if coupling else update, lambda t, x, u, p: x, **names)
+    middle = ct.nlsys(update, lambda t, x, u, p: x, **names)
     relays = [nlctl.block(nlctl.IdealRelay(), name) for name in ("r1", "r2")]
     wires = [[f"r{k}.u", f"plant.u{k}"] for k in (1, 2)] + [
         [f"plant.v{k}", f"r{k}.v"] for k in (1, 2)
@@ -294,15 +299,23 @@ def cascade(coupling):
 
 def test_two_relays_slide_at_once_where_one_acts_on_the_other():
     """v2 = 0.2 cos t and v1 = 0.3 - 0.4 v2."""
-    v1, v2 = run(cascade(False), [1.0, -1.5]).outputs[:, TIMES > 5]
+    v1, v2 = run(cascade(one_way), [1.0, -1.5]).outputs[:, TIMES > 5]
     t = TIMES[TIMES > 5]
     np.testing.assert_allclose(v2, 0.2 * np.cos(t), rtol=0, atol=1e-7)
     np.testing.assert_allclose(v1, 0.3 - 0.08 * np.cos(t), rtol=0, atol=1e-7)
 
 
-def test_two_that_act_on_each_other_are_refused():
+def test_two_that_act_on_each_other_keep_both_inputs():
+    """v1 + 0.4 v2 = 0.3 and 0.1 v1 + v2 = 0.2 cos t."""
+    outputs = run(cascade(both_ways), [1.0, -1.5]).outputs[:, TIMES > 5]
+    given = np.array([np.full(outputs.shape[1], 0.3), 0.2 * np.cos(TIMES[TIMES > 5])])
+    expected = np.linalg.solve([[1.0, 0.4], [0.1, 1.0]], given)
+    np.testing.assert_allclose(outputs, expected, rtol=0, atol=1e-7)
+
+
+def test_two_that_act_on_each_other_otherwise_are_refused():
     with pytest.raises(CompileError, match="relays 'r1', 'r2' act on the rates of each other's"):
-        nlctl.compile(cascade(True))
+        nlctl.compile(cascade(by_product))
 
 
 @each_row(

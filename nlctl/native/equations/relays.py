@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 
 from ...blocks import supplied_of
-from ...expressions.arrays import Tracer, concatenated
+from ...expressions.arrays import Tracer, concatenated, leaf_vector
 from ...expressions.graph import Expr, Graph
-from ...sliding.relay import SLIDING
+from ...expressions.stage import Stage
+from ...sliding.relay import SLIDING, kept_mode
 from ..diagram.nodes import Node
 from ..diagram.program import memory
 from ..diagram.schedule import Schedule
@@ -48,6 +49,7 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
             name=blocks[i].path,
             leaf=leaf,
             given=first.wired(blocks[i].inputs)[0].only,
+            kept=kept_of(first, i),
             limits=limits_of(first, i),
         )
         for i, leaf in zip(places, leaves, strict=True)
@@ -78,6 +80,12 @@ def limits_of(reader: Reader, i: int) -> Limits:
     given = traced_parameters(reader.graph, reader.blocks[i].system, reader.layout[i], reader.p)
     names = (f.name for f in fields(Limits))
     return Limits(**{name: reader.graph.number(getattr(given, name).only) for name in names})
+
+
+def kept_of(reader: Reader, i: int) -> Expr:
+    """Return what the memory of a relay stands for: 1 or -1 on a side, 0 where it slides."""
+    mode = leaf_vector(reader.graph, "x", reader.blocks[i].state_offset, (1,))
+    return Stage(reader.graph).copied(kept_mode)(mode[0]).only
 
 
 def _rates(reader: Reader) -> list[Expr]:

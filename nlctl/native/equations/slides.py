@@ -20,14 +20,14 @@ import numpy as np
 from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array, concatenated
 from ...expressions.conditions import switching_functions
-from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, needed
+from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
 from ..diagram.nodes import Node
 from ..diagram.program import count_switching_functions, memory
 from ..diagram.schedule import Schedule
 from ..sliding.rates import OUTPUTS, Motion, SlidingInput, SlidingRate, sliding_rates
 from .located import Conditions, sign_key
 from .reader import Reader, vector_of
-from .relays import limits_of, relay_places
+from .relays import kept_of, limits_of, relay_places
 
 Results = dict[str, list[tuple[int, Tracer]]]
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
@@ -62,8 +62,10 @@ def of_both_sides(
         for node, values in zip(changing, sides, strict=True)
     ]
     below, above = (
-        _folded(graph, exprs, dict(zip(changing, side, strict=True)))
-        for side in zip(*continued, strict=True)
+        _folded(
+            graph, exprs, {node: both[k] for node, both in zip(changing, continued, strict=True)}
+        )
+        for k in range(2)
     )
     return below, above
 
@@ -114,6 +116,7 @@ class _Between:
     node: Node
     place: int  # of the node among the blocks
     leaf: Expr  # what stands for the relay's output, from -1 to 1
+    kept: Expr  # its mode: 1 or -1 on a side, 0 where it slides
     function: Expr  # the switching function, the relay's input
     changing: tuple[Expr, ...]
 
@@ -129,8 +132,7 @@ class _Between:
     def by_mode(self, exprs: Sequence[Expr], v: Expr) -> list[Expr]:
         """Return expressions as they are on the side that the relay's memory says, or between."""
         op, const = self.graph.op, self.graph.const
-        mode = self.graph.leaf("x", self.node.state_offset, None)
-        below, above = op("lt", mode, const(-0.5)), op("gt", mode, const(0.5))
+        below, above = op("lt", self.kept, const(0.0)), op("gt", self.kept, const(0.0))
         chosen = []
         for a, b, between in zip(*self._sides(exprs), self.blended(exprs, v), strict=True):
             inner = op("select", above, b, between)
@@ -140,6 +142,39 @@ class _Between:
     def _sides(self, exprs: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
         sides = self.node.slide.sides if self.node.slide else ()
         return of_both_sides(self.graph, exprs, self.changing, sides, self.function)
+
+
+def _by_terms(
+    graph: Graph,
+    exprs: Sequence[Expr],
+    slides: Sequence[_Between],
+    change: Callable[[int, Sequence[Expr]], list[Expr]],
+) -> list[Expr]:
+    """Return expressions with all slides, of a sum each term with those that it depends on."""
+    # A product of what two do would not be a + B v, though their sum is.
+    if len(slides) == 1:
+        return change(0, exprs)
+    depends: dict[Expr, frozenset[int]] = {}
+    for node in needed(exprs):
+        here = {k for k, slide in enumerate(slides) if node in slide.changing}
+        depends[node] = frozenset(here).union(*(depends[arg] for arg in node.args))
+
+    def terms(node: Expr) -> tuple[Expr, ...]:
+        by = [bool(depends[arg]) for arg in node.args]
+        scaled = (node.op == "mul" and sum(by) == 1) or (node.op == "div" and not by[1])
+        several = len(depends[node]) > 1 and (node.op in ("add", "sub", "neg") or scaled)
+        return node.args if several else ()
+
+    def changed(node: Expr) -> Expr:
+        if terms(node):
+            return graph.op(node.op, *(new[arg] for arg in node.args))
+        one = [node]
+        for k in sorted(depends[node]):
+            one = change(k, one)
+        return one[0]
+
+    new: dict[Expr, Expr] = {}
+    return [deduce(new, expr, terms, changed) for expr in exprs]
 
 
 def with_slides(
@@ -152,10 +187,11 @@ def with_slides(
     derived = _derived(reader, schedule, results, slides)
     outputs = [one.output for one in derived]
 
+    def by_mode(k: int, exprs: Sequence[Expr]) -> list[Expr]:
+        return slides[k].by_mode(exprs, outputs[k])
+
     def changed(exprs: Sequence[Expr]) -> list[Expr]:
-        for slide, v in zip(slides, outputs, strict=True):
-            exprs = slide.by_mode(exprs, v)
-        return list(exprs)
+        return _by_terms(reader.graph, exprs, slides, by_mode)
 
     _check_apart(reader, schedule, results, changed)
     slid = results | {name: _changed(reader.graph, results[name], changed) for name in _BLENDED}
@@ -176,8 +212,10 @@ def _slides(reader: Reader, results: Results, conditions: Conditions) -> list[_B
             raise CompileError(f"{_who(node)} compares otherwise than where it was seen to jump")
         leaf = graph.leaf(OUTPUTS, first + len(slides), None)
         slides.append(
-            _Between(graph=graph, node=node, place=i, leaf=leaf, function=functions[0],
-                     changing=changing)
+            _Between(
+                graph=graph, node=node, place=i, leaf=leaf, kept=kept_of(reader, i),
+                function=functions[0], changing=changing,
+            )
         )  # fmt: skip
     return slides
 
@@ -189,9 +227,10 @@ def _derived(
     graph = reader.graph
 
     def blended(exprs: Sequence[Expr], of: Sequence[_Between] = slides) -> list[Expr]:
-        for slide in of:
-            exprs = slide.blended(exprs, slide.leaf)
-        return list(exprs)
+        def by(k: int, exprs: Sequence[Expr]) -> list[Expr]:
+            return of[k].blended(exprs, of[k].leaf)
+
+        return _by_terms(graph, exprs, of, by)
 
     rates: dict[int, Expr] = {
         row + k: graph.number(array[k].only)
@@ -201,7 +240,8 @@ def _derived(
     rates |= {m: graph.const(0.0) for node in reader.blocks for m in memory(node)}
     inputs = [
         SlidingInput(
-            name=_who(slide.node), leaf=slide.leaf, limits=limits_of(reader, slide.place),
+            name=_who(slide.node), leaf=slide.leaf, kept=slide.kept,
+            limits=limits_of(reader, slide.place),
             given=blended([slide.function], [other for other in slides if other is not slide])[0],
         )
         for slide in slides

@@ -17,6 +17,7 @@ from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from .pieces import LeafDerivative, bend_places, slope_of, unreadable, zero_between
 from .second import Limits, second_order
+from .together import Coupled, own_rates
 
 OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs
 _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
@@ -29,6 +30,7 @@ class SlidingInput:
     name: str  # of the relay's block
     leaf: Expr  # what stands for the relay's output
     given: Expr  # the input, an expression
+    kept: Expr  # its mode: 1 or -1 on a side, 0 where it slides
     limits: Limits  # its parameters
 
 
@@ -66,20 +68,45 @@ def sliding_rates(
     solved: dict[int, SlidingRate] = {}
     while len(solved) < len(relays):
         outputs = {leaves[i]: one.output for i, one in solved.items()}
-        ready = [
-            i for i in range(len(relays)) if i not in solved and read[i] <= {leaves[i], *outputs}
-        ]
+        left = [i for i in range(len(relays)) if i not in solved]
+        ready = [i for i in left if read[i] <= {leaves[i], *outputs}]
+        lines = {i: [*rates[i].line, *rates[i].piece] for i in ready}
         if not ready:
-            names = ", ".join(f"'{r.name}'" for i, r in enumerate(relays) if i not in solved)
-            raise CompileError(
-                f"the ideal relays {names} act on the rates of each other's inputs: what slides "
-                f"where both inputs are 0 has no one answer; of one {_SMOOTH}"
-            )
-        for i in ready:
-            drift, gain, *here = replaced_parts(graph, [*rates[i].line, *rates[i].piece], outputs)
+            wholes = replaced_parts(graph, [rates[i].whole for i in left], outputs)
+            lines = _together(graph, dict(zip(left, wholes, strict=True)), relays, motion, output)
+        for i, line in lines.items():
+            drift, gain, *here = replaced_parts(graph, line, outputs)
             v = output(i, (relays[i].given, here[0], here[1]))
             solved[i] = SlidingRate(drift=drift, gain=gain, output=v)
     return [solved[i] for i in range(len(relays))]
+
+
+def _together(
+    graph: Graph,
+    rates: Mapping[int, Expr],
+    relays: Sequence[SlidingInput],
+    motion: Motion,
+    output: Callable[[int, tuple[Expr, Expr, Expr]], Expr],
+) -> dict[int, list[Expr]]:
+    """Return a and b, twice, of relays that act on each other's rates."""
+    op, zero, one = graph.op, graph.const(0.0), graph.const(1.0)
+    coupled = [
+        Coupled(
+            leaf=relays[i].leaf, rate=rate, slides=op("eq", relays[i].kept, zero),
+            held=output(i, (relays[i].given, zero, one)),
+            decays=op("mul", relays[i].limits.rate, relays[i].given),
+        )
+        for i, rate in rates.items()
+    ]  # fmt: skip
+    own = own_rates(graph, coupled, lambda leaf: slope_of(graph, leaf, motion.solutions))
+    if own is None:
+        names = ", ".join(f"'{relays[i].name}'" for i in rates)
+        raise CompileError(
+            f"the ideal relays {names} act on the rates of each other's inputs, and not as a + B v "
+            f"that can be read off: what slides where several inputs are 0 has no one answer; of "
+            f"one {_SMOOTH}"
+        )
+    return {i: [*line, *line] for i, line in zip(rates, own, strict=True)}
 
 
 @dataclass(frozen=True, kw_only=True)
