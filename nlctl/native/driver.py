@@ -36,7 +36,7 @@ from .machine.routine import entries_of
 from .results import Statistics, Trajectory, at_its_end, made
 from .run import Run
 from .settings import METHODS, Settings
-from .slid import slid_instead
+from .slid import sliding
 from .spare import give_back, workspace
 from .taylor.method import with_taylor
 from .taylor.turns import turned, with_turns
@@ -82,7 +82,8 @@ def followed_up(
         return run_once(replace(course, compiled=compiled), x0, p, progress)
 
     if reached.statistics.jump is not None and course.settings.slide:
-        return slid_instead(run, course.compiled, reached, (x0, p), float(np.ptp(course.times)))
+        span = float(np.ptp(course.times))
+        return sliding(run, course.compiled, reached, (x0, p), span).of_diagram(course.compiled)
     if not reached.cut:
         return reached
     compiled, cut = course.compiled, reached.cut

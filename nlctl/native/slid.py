@@ -143,36 +143,68 @@ def _sides(values: np.ndarray, s: np.ndarray) -> tuple[float, float] | None:
     return (float(below[0]), float(above[0])) if below.size == above.size == 1 else None
 
 
-def slid_instead(
+@dataclass(frozen=True, kw_only=True)
+class SlidRun:
+    """A run of a diagram with relays for conditions."""
+
+    compiled: Compiled  # the diagram with relays, whose modes are its last states
+    p: np.ndarray  # all parameters
+    reached: Trajectory
+    slides: tuple[tuple[Slide, float], ...] = ()  # with how far functions are from 0 at rest
+
+    def of_diagram(self, original: Compiled) -> Trajectory:
+        """Return the run without what is the relays'."""
+        if not self.slides:
+            return self.reached
+        states, inputs = original.system.nstates or 0, original.schedule.ninputs
+        reached, jump = self.reached, self.reached.statistics.jump
+        if jump is not None:
+            jump = replace(
+                jump, before=jump.before[:states], after=jump.after[:states],
+                inputs=jump.inputs[:inputs], crowd=None,
+            )  # fmt: skip
+        return self.named(
+            replace(
+                reached, states=reached.states[:states], inputs=reached.inputs[:inputs],
+                statistics=replace(reached.statistics, jump=jump),
+            )
+        )  # fmt: skip
+
+    def named(self, reached: Trajectory) -> Trajectory:
+        """Return a run that says along what it slides."""
+        whats = (slide.what for slide, _ in self.slides)
+        names = tuple(f"{what} of block '{block}'" for block, what in whats)
+        return replace(reached, statistics=replace(reached.statistics, slides=names))
+
+
+def sliding(
     run: Callable[[Compiled, np.ndarray, np.ndarray], Trajectory],
     compiled: Compiled,
     reached: Trajectory,
     start: tuple[np.ndarray, np.ndarray],
     span: float,
-) -> Trajectory:
+) -> SlidRun:
     """Return a run that chatters no longer, if relays can stand for the conditions of that."""
     # `run` has a diagram, an initial state and a parameter vector.
     x0, p = start
-    slides: list[tuple[Slide, float]] = []
-    again, diagram, whole = reached, compiled, p
-    while (jump := again.statistics.jump) is not None and len(slides) < MOST:
-        done = again.statistics
+    last = SlidRun(compiled=compiled, p=p, reached=reached)
+    while (jump := last.reached.statistics.jump) is not None and len(last.slides) < MOST:
+        done = last.reached.statistics
         scale = done.atol + done.rtol * np.maximum(np.abs(jump.before), np.abs(jump.after))
-        more = slides_at(diagram, whole, jump, scale)
-        more = [(_counted(slide, slides), far) for slide, far in more]
+        more = slides_at(last.compiled, last.p, jump, scale)
         if not more:
             break
+        slides = (*last.slides, *((_counted(slide, last.slides), far) for slide, far in more))
         try:
-            diagram = with_relays(compiled, tuple(slide for slide, _ in [*slides, *more]), p)
-            whole = _parameters(diagram, p, [far for _, far in [*slides, *more]], span)
-            further = run(diagram, np.append(x0, np.zeros(len(slides) + len(more))), whole)
+            diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
+            whole = _parameters(diagram, p, [far for _, far in slides], span)
+            further = run(diagram, np.append(x0, np.zeros(len(slides))), whole)
         except (CompileError, ParameterError):
             break
         if not further.statistics.time > done.time:
             break
-        again = further
-        slides += more
-    return _of_diagram(again, x0.size, compiled.schedule.ninputs, [one for one, _ in slides])
+        last = SlidRun(compiled=diagram, p=whole, reached=further, slides=slides)
+    return last
 
 
 def _counted(slide: Slide, before: Sequence[tuple[Slide, float]]) -> Slide:
@@ -236,20 +268,3 @@ def _parameters(slid: Compiled, p: np.ndarray, far: Sequence[float], span: float
         for name, value in values.items():
             whole[slid.program.layout[i][name].offset] = value
     return whole
-
-
-def _of_diagram(run: Trajectory, states: int, inputs: int, slides: Sequence[Slide]) -> Trajectory:
-    """Return a run of a diagram with relays without what is theirs."""
-    if not slides:
-        return run
-    done, jump = run.statistics, run.statistics.jump
-    if jump is not None:
-        jump = replace(
-            jump, before=jump.before[:states], after=jump.after[:states],
-            inputs=jump.inputs[:inputs], crowd=None,
-        )  # fmt: skip
-    names = tuple(f"{what} of block '{name}'" for name, what in (one.what for one in slides))
-    return replace(
-        run, states=run.states[:states], inputs=run.inputs[:inputs],
-        statistics=replace(done, jump=jump, slides=names),
-    )  # fmt: skip

@@ -20,6 +20,7 @@ from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
+from ..native.slid import SlidRun, sliding
 from ..native.spare import give_back
 from ..responses.arguments import held, input_array, state_array
 from .beginning import Arrays, commits_at_start, evaluated_rows
@@ -69,15 +70,16 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     signals = observed_signals(compiled, run.of)
     quantities = varied_quantities(compiled, names)
     x0 = state_array(compiled.system, run.initial_state)
-    differentiated = _compiled(compiled, signals, quantities, p, run.settings)
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
-    span = float(run.times[0]), float(run.times[-1])
-    rise = float(np.ptp(u, axis=1).max(initial=0.0))
-    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span, rise)
-    start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
-    reached = run_once(_course(differentiated, run, u), start, whole)
-    reached = _at_its_end(reached, run.times.size, differentiated.outputs)
+    named = signals, quantities
+    one = _integrated(compiled, run, named, (u, x0, p, scale))
+    slid = _slid(compiled, run, one.reached, (u, x0, p))
+    if slid.slides:
+        x0 = np.append(x0, np.zeros(len(slid.slides)))
+        one = _integrated(slid.compiled, run, named, (u, x0, slid.p, scale))
+        one = replace(one, reached=slid.named(one.reached))
+    differentiated, reached, start, whole = one.differentiated, one.reached, one.start, one.p
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _alone(compiled, run)
@@ -85,10 +87,56 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
         reached = _shown(shown, reached, differentiated, whole)
     full = tuple(quantity.name for quantity in quantities)
     given = (run.times, start, whole, u)
-    lacks = missing(differentiated, (compiled, full), reached, given, commits)
+    lacks = missing(differentiated, (slid.compiled, full), reached, given, one.commits)
     return _response(
         differentiated, (signals, quantities), (run.times[::shown], reached), scale, lacks
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Integrated:
+    """A run of a program with derivatives."""
+
+    differentiated: Differentiated
+    reached: Trajectory
+    start: np.ndarray  # its initial state
+    p: np.ndarray  # and its parameters
+    commits: list[Arrays]
+
+
+def _integrated(
+    compiled: Compiled,
+    run: RunWithDerivatives,
+    named: tuple[Sequence[Observed], Sequence[VariedQuantity]],
+    given: tuple[np.ndarray, ...],
+) -> _Integrated:
+    """Run a diagram with its derivatives."""
+    (signals, quantities), (u, x0, p, scale) = named, given
+    differentiated = _compiled(compiled, signals, quantities, p, run.settings)
+    span = float(run.times[0]), float(run.times[-1])
+    rise = float(np.ptp(u, axis=1).max(initial=0.0))
+    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span, rise)
+    start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
+    reached = run_once(_course(differentiated.compiled, run, u), start, whole)
+    return _Integrated(
+        differentiated=differentiated, start=start, p=whole, commits=commits,
+        reached=_at_its_end(reached, run.times.size, differentiated.outputs),
+    )  # fmt: skip
+
+
+def _slid(
+    compiled: Compiled, run: RunWithDerivatives, reached: Trajectory, given: tuple[np.ndarray, ...]
+) -> SlidRun:
+    """Return the run without derivatives that slides, if the one with them switches without end."""
+    (u, x0, p), status = given, reached.statistics.status
+    if status not in (Status.ZENO, Status.CHATTERING) or not run.settings.slide:
+        return SlidRun(compiled=compiled, p=p, reached=reached)
+
+    def alone(compiled: Compiled, x0: np.ndarray, p: np.ndarray) -> Trajectory:
+        return run_once(_course(compiled, run, u), x0, p)
+
+    span = float(np.ptp(run.times))
+    return sliding(alone, compiled, alone(compiled, x0, p), (x0, p), span)
 
 
 def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
@@ -201,10 +249,9 @@ def _start(
     return start, commits
 
 
-def _course(differentiated: Differentiated, run: RunWithDerivatives, u: np.ndarray) -> Course:
-    """Return the run of a diagram with its derivatives."""
-    settings = run.settings
-    return Course(compiled=differentiated.compiled, times=run.times, inputs=u, settings=settings)
+def _course(compiled: Compiled, run: RunWithDerivatives, u: np.ndarray) -> Course:
+    """Return the run of a program."""
+    return Course(compiled=compiled, times=run.times, inputs=u, settings=run.settings)
 
 
 def _beginning(
@@ -215,7 +262,7 @@ def _beginning(
     p: np.ndarray,
 ) -> Arrays:
     """Return what a run begins with, behind all that happens at once."""
-    first = prepared(_course(differentiated, run, u), start[:, None], p[:, None])
+    first = prepared(_course(differentiated.compiled, run, u), start[:, None], p[:, None])
     with np.errstate(all="ignore"):
         begin(first)
     work = first.work

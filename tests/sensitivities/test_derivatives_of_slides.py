@@ -1,0 +1,61 @@
+"""Derivatives of runs that slide along conditions: closed forms, and differences of runs."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+
+
+def friction():
+    """v' = a t - c sign(v)."""
+    return ct.nlsys(
+        lambda t, x, u, p: [p["a"] * t - p["c"] * np.sign(x[0])], None, states=1, inputs=0,
+        outputs=1, name="block", params={"a": 0.1, "c": 1.0},
+    )  # fmt: skip
+
+
+def test_dry_friction_forgets_while_it_rests():
+    """Behind the release at t = c / a = 10: v = a (t^2 - 100) / 2 - c (t - 10)."""
+    times = np.linspace(0, 15, 16)
+    by = nlctl.sensitivity_response(
+        friction(), times, 0, 1.0, with_respect_to=["a", "c", "block.x[0](0)"]
+    )
+    assert not by.missing
+    assert by.statistics.slides == ("sign of block 'block'",)
+    slope = np.array([times**2 / 2, -times, np.ones_like(times)])  # until it rests at 1.056
+    slope[:, times > 1.06] = 0.0
+    late = times >= 10
+    slope[0, late], slope[1, late] = (times[late] ** 2 - 100) / 2, -(times[late] - 10)
+    assert by.derivatives[0] == pytest.approx(slope, abs=1e-7)
+
+
+def test_friction_is_found_from_data():
+    times = np.linspace(0, 15, 61)
+    rests = 10 - np.sqrt(80)
+    v = np.where(times < rests, 1 + times**2 / 20 - times, 0.0)
+    v = np.where(times > 10, (times - 10) ** 2 / 20, v)
+    fit = nlctl.fit(friction(), times, {"y[0]": v}, {"c": (1.3, 0.5, 2.0)}, initial_state=1.0)
+    assert fit.values[0] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_two_masses_with_friction_have_the_slopes_of_differences():
+    def update(t, x, u, params):
+        x1, v1, x2, v2 = x
+        between, ground = params["f1"] * np.sign(v1 - v2), params["f2"] * np.sign(v2)
+        force = params["g"] * np.sin(t) - 3 * (x1 - x2)
+        return [v1, force - between, v2, (between - ground + 3 * (x1 - x2)) / 2]
+
+    masses = ct.nlsys(update, None, states=4, inputs=0, outputs=4, name="masses",
+                      params={"f1": 0.8, "f2": 0.5, "g": 2.0})  # fmt: skip
+    times, start, names = np.linspace(0, 6, 13), [0.1, 0.0, 0.0, 0.0], ["f1", "f2", "g"]
+    loop = nlctl.compile(masses)
+    by = nlctl.sensitivity_response(loop, times, 0, start, with_respect_to=names)
+    assert not by.missing
+    for j, name in enumerate(names):
+        value, h = masses.params[name], 1e-5
+        ends = [
+            nlctl.input_output_response(loop, times, 0, start, params={name: value + k * h}).states
+            for k in (-1, 1)
+        ]
+        assert by.derivatives[:, j] == pytest.approx((ends[1] - ends[0]) / (2 * h), abs=2e-5)
