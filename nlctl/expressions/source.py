@@ -65,7 +65,7 @@ def definition(function: FunctionType) -> Definition:
             advice = "define it in a file: it was made of a text, as by exec"
         raise Unreadable("its source is not what it was made of", advice)
     nodes = [node for node in _candidates(places, code) if _contains(node, code)]
-    if not nodes or len({ast.dump(node) for node in nodes}) > 1:
+    if not nodes or (len(nodes) > 1 and len(set(map(ast.dump, nodes))) > 1):
         advice = "give each function a line of its own"
         raise Unreadable("its source cannot be distinguished from others on the same line", advice)
     return nodes[0]
