@@ -6,6 +6,7 @@ No rate of a state depends on them, so that error control sees nothing of the pu
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -186,9 +187,7 @@ def since_window(function, width):
     return nlctl.block(Since(), "w")
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("kink", KINKS)
+@pytest.mark.parametrize(("method", "width", "kink"), crossed([*METHODS], [*WIDTHS], [*KINKS]))
 def test_an_event_function_below_zero_around_its_kink(kink, width, method):
     function, before, behind = KINKS[kink]
     diagram = nlctl.compile(ramp(lambda x: x))
@@ -205,9 +204,7 @@ def test_an_event_function_below_zero_around_its_kink(kink, width, method):
     np.testing.assert_allclose(own, expected, rtol=0, atol=max(1e-7, 1e-3 * width) + 1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("kink", KINKS)
+@pytest.mark.parametrize(("method", "width", "kink"), crossed([*METHODS], [*WIDTHS], [*KINKS]))
 def test_a_guard_that_falls_around_its_kink(kink, width, method):
     diagram = since_window(KINKS[kink][0], width)
     y = nlctl.input_output_response(
