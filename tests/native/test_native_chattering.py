@@ -131,8 +131,9 @@ GIVEN = {
 }
 
 
-@pytest.mark.parametrize("given", GIVEN)
-@pytest.mark.parametrize("method", ["auto", "tsit5", "rodas5p", "taylor"])
+@pytest.mark.parametrize(
+    ("given", "method"), crossed([*GIVEN], ["auto", "tsit5", "rodas5p", "taylor"])
+)
 def test_samples_of_an_input_are_no_chattering(given, method):
     """A lag at rest goes from sample to sample, and its rate is rounding; it follows its input."""
     lag = nlctl.block(nlctl.Lag(T=0.5), "lag")

@@ -63,9 +63,9 @@ def run(diagram, method, rtol, **kwargs):
 SINCE_A_HALF = np.where(TIMES < 0.5, TIMES, (TIMES - 0.5) % 1.0)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("rtol", TOLERANCES)
-@pytest.mark.parametrize("source", [signal, ramp])
+@pytest.mark.parametrize(
+    ("method", "rtol", "source"), crossed([*METHODS], [*TOLERANCES], [signal, ramp])
+)
 def test_a_guard_behind_a_pulse(source, method, rtol):
     """A pulse of 3 ms of t, or of a state, resets a clock."""
     diagram = nlctl.interconnect({"s": source(pulse), "w": Since()}, outputs=["since"])
@@ -81,9 +81,9 @@ def test_a_guard_with_a_pulse_of_its_own(method, rtol):
     np.testing.assert_allclose(found.outputs.reshape(-1), SINCE_A_HALF, atol=max(rtol, 1e-8))
 
 
-@pytest.mark.parametrize("method", WITH_MEMORY)
-@pytest.mark.parametrize("rtol", TOLERANCES)
-@pytest.mark.parametrize("source", [signal, ramp])
+@pytest.mark.parametrize(
+    ("method", "rtol", "source"), crossed([*WITH_MEMORY], [*TOLERANCES], [signal, ramp])
+)
 def test_a_play_behind_a_pulse(source, method, rtol):
     """A play of half-width 1/4 is drawn to 3/4 by a pulse of height 1, and back to 1/4 behind it.
 
