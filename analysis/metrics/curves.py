@@ -48,7 +48,7 @@ def _pieces(t, breaks):
     n = inside.size
     first, last = np.zeros(n + 1, np.int64), np.full(n + 1, t.size)
     start, end = np.full(n + 1, t[0]), np.full(n + 1, t[-1])
-    for i in range(n):
+    for i in range(n):  # one by one, here and below: slices take twice as long to compile
         first[i + 1] = np.searchsorted(t, inside[i] + near, "right")
         last[i] = np.searchsorted(t, inside[i] - near, "left")
         start[i + 1] = end[i] = inside[i]
