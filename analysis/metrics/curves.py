@@ -305,9 +305,9 @@ def path(t, y, breaks, apart=0.0):
     firsts, lasts, starts, ends = _pieces(t, breaks)
     parts, n = np.ones(t.size, np.int64), 0
     for first, last in zip(firsts, lasts):  # noqa: B905 (numba)
-        own = _parts(t[first:last], y[first:last], tolerance)
-        for i in range(own.size):
-            parts[first + i] = own[i]
+        divided = _parts(t[first:last], y[first:last], tolerance)
+        for i in range(divided.size):
+            parts[first + i] = divided[i]
     size = np.sum(parts) + 2 * _ENDS * firsts.size
     times, values, done = np.empty(size), np.empty(size), 0
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)

@@ -19,7 +19,7 @@ from typing import cast
 
 Definition = ast.FunctionDef | ast.Lambda
 Places = dict[tuple[str, int], list[Definition]]
-Known = dict[CodeType, list[Definition]]
+_ByCode = dict[CodeType, list[Definition]]
 _NAMED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 _LOOPS = ("<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>")  # code of its own in some Pythons
 
@@ -57,7 +57,7 @@ def definition(function: FunctionType) -> Definition:
         raise Unreadable("its source cannot be found", "define it in a file or a notebook")
     try:
         module = text, file, code.co_flags & _FUTURES
-        places, codes, known = _compiled(*module)
+        places, codes, by_code = _compiled(*module)
     except (SyntaxError, ValueError) as error:
         raise Unreadable(f"its source cannot be parsed ({error})", "mend its file") from error
     if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
@@ -65,9 +65,9 @@ def definition(function: FunctionType) -> Definition:
         if code.co_filename == "<string>":
             advice = "define it in a file: it was made of a text, as by exec"
         raise Unreadable("its source is not what it was made of", advice)
-    if code not in known:
-        known[code] = [node for node in _candidates(places, code) if _contains(node, code)]
-    nodes = known[code]
+    if code not in by_code:
+        by_code[code] = [node for node in _candidates(places, code) if _contains(node, code)]
+    nodes = by_code[code]
     if not nodes or (len(nodes) > 1 and len(set(map(ast.dump, nodes))) > 1):
         advice = "give each function a line of its own"
         raise Unreadable("its source cannot be distinguished from others on the same line", advice)
@@ -99,10 +99,10 @@ def _file_and_text(function: FunctionType) -> tuple[str, str]:
 
 
 @functools.lru_cache(maxsize=128)
-def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeType], Known]:
+def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeType], _ByCode]:
     """Return the functions of a module by their names and first lines, and all code inside it.
 
-    With a place for what is known of functions by their code.
+    With a place for the functions by their code.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python has said once what it thinks of this text
