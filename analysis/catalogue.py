@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import importlib
 from collections.abc import Callable
 from pathlib import Path
@@ -76,6 +77,7 @@ def making_function(name: str) -> Any:
     return getattr(importlib.import_module(f"nlctl.{group}"), name)
 
 
+@functools.cache
 def _summaries(group: str, chosen: Callable[[ast.stmt], bool]) -> dict[str, str]:
     """Return what is chosen of the public names of a module, or of a package and its rooms."""
     summaries = {

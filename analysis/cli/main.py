@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shlex
 import warnings
 from pathlib import Path
@@ -332,12 +333,18 @@ def _say_warnings() -> None:
     warnings.showwarning = shown
 
 
+@functools.cache
+def _command() -> Any:
+    """Return what the commands are to Typer; in a process of many calls they are read once."""
+    return typer.main.get_command(app)
+
+
 def main() -> None:
     """Run the command line; what the user can put right ends in one sentence and exit code 2."""
     # An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     _say_warnings()
     try:
         with exit_codes(json=False):
-            app()
+            _command()()
     except typer.Exit as ended:
         raise SystemExit(ended.exit_code) from None

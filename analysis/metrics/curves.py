@@ -48,10 +48,10 @@ def _pieces(t, breaks):
     n = inside.size
     first, last = np.zeros(n + 1, np.int64), np.full(n + 1, t.size)
     start, end = np.full(n + 1, t[0]), np.full(n + 1, t[-1])
-    first[1:] = np.searchsorted(t, inside + near, "right")
-    last[:n] = np.searchsorted(t, inside - near, "left")
-    start[1:] = inside
-    end[:n] = inside
+    for i in range(n):  # one by one, here and below: slices take twice as long to compile
+        first[i + 1] = np.searchsorted(t, inside[i] + near, "right")
+        last[i] = np.searchsorted(t, inside[i] - near, "left")
+        start[i + 1] = end[i] = inside[i]
     return first, np.maximum(last, first), start, end
 
 
@@ -73,7 +73,8 @@ def _differences(t, y, count):
     """Return divided differences: f[t_i, ..., t_(i + m)], m < count, is `table[i, m]`."""
     # A row has the coefficients of Newton's form of the polynomial through a sample and the next.
     table = np.empty((t.size, count))
-    table[:, 0] = y
+    for i in range(t.size):
+        table[i, 0] = y[i]
     for m in range(1, count):
         for i in range(t.size - m):
             table[i, m] = (table[i + 1, m - 1] - table[i, m - 1]) / (t[i + m] - t[i])
@@ -166,9 +167,7 @@ def turning_points(t, y, breaks):
             continue
         own_t, own_y, size = t[first:last], y[first:last], last - first
         d = consecutive_differences(own_y)
-        up, down = np.ones(size), -np.ones(size)
-        up[1:], down[:-1] = d, d
-        up[0], down[-1] = -d[0], -d[-1]
+        up, down = np.append(-d[:1], d), np.append(d, -d[-1:])
         turns = ((up > 0) & (down <= 0)) | ((up < 0) & (down >= 0))
         for k in np.nonzero(turns)[0]:
             low = own_t[k - 1] if k > 0 else start
@@ -251,7 +250,8 @@ def _divide(t, y, k, table, doubt, times, values):
     c = table[a]
     for i in range(n):
         times[i] = t[k] + (i + 1) / (n + 1) * step
-    values[:] = c[-1]
+    for i in range(n):
+        values[i] = c[-1]
     for m in range(c.size - 2, -1, -1):
         for i in range(n):
             values[i] = values[i] * (times[i] - t[a + m]) + c[m]
@@ -284,7 +284,8 @@ def _follow(t, y, parts, times, values):
 @equation
 def _put(times, values, n, t, y):
     """Write samples; return how many points there are then."""
-    times[n : n + t.size], values[n : n + t.size] = t, y
+    for i in range(t.size):
+        times[n + i], values[n + i] = t[i], y[i]
     return n + t.size
 
 
@@ -304,7 +305,9 @@ def path(t, y, breaks, apart=0.0):
     firsts, lasts, starts, ends = _pieces(t, breaks)
     parts, n = np.ones(t.size, np.int64), 0
     for first, last in zip(firsts, lasts):  # noqa: B905 (numba)
-        parts[first:last] = _parts(t[first:last], y[first:last], tolerance)
+        divided = _parts(t[first:last], y[first:last], tolerance)
+        for i in range(divided.size):
+            parts[first + i] = divided[i]
     size = np.sum(parts) + 2 * _ENDS * firsts.size
     times, values, done = np.empty(size), np.empty(size), 0
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)

@@ -28,7 +28,7 @@ from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choice
 from .operators import elementwise
 from .passes import Passes
 from .promoted import is_numpys
-from .source import Definition, Unreadable, definition
+from .source import Definition, Unreadable, codes_in, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _LEAVING = ast.Return | ast.Break | ast.Continue
@@ -42,21 +42,27 @@ _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
     """Return the code of a function as it is traced: its own, if there is nothing to rewrite."""
     # With `merging` both branches of a condition are followed at once where they only compute.
-    words = (*_WORDS, ast.If, ast.IfExp) if merging else _WORDS
+    code, names = function.__code__, function.__globals__
     try:
         tree = definition(function)
     except Unreadable:
-        return function.__code__
+        return code
+    read = ((n, names.get(n)) for part in codes_in(code) for n in part.co_names)
+    named = frozenset(r for r in read if r[1] is contextlib or r[1] is contextlib.suppress)
+    return _rewritten(tree, code, code.co_filename, named, merging)
+
+
+@functools.lru_cache(maxsize=2048)  # equal code may stand in several files
+def _rewritten(tree: Any, code: CodeType, _: str, named: Set[Any], merging: bool) -> CodeType:
+    words = (*_WORDS, ast.If, ast.IfExp) if merging else _WORDS
     kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
-    if "__class__" in function.__code__.co_freevars:
+    if "__class__" in code.co_freevars:  # only within a class is it what it is
         _check_as_it_is(tree, kinds, merging)
-        return function.__code__  # (only within a class is ``__class__`` what it is)
-    if not kinds:
-        return function.__code__
-    body = _Rewriter(function.__globals__).visit(_as_statements(copy.deepcopy(tree)))
-    body = Merger().visit(PassWriter().visit(body)) if merging else body
-    body.decorator_list = []
-    return _compiled(body, function.__code__)
+    elif kinds:
+        body = _Rewriter(dict(named)).visit(_as_statements(copy.deepcopy(tree)))
+        body = Merger().visit(PassWriter().visit(body)) if merging else body
+        return _compiled(body, code)
+    return code
 
 
 def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
@@ -91,7 +97,7 @@ def _compiled(node: Definition, code: CodeType) -> CodeType:
     outer = ast.parse(f"def outer({', '.join(code.co_freevars)}): pass").body[0]
     assert isinstance(outer, ast.FunctionDef)
     assert isinstance(node, ast.FunctionDef)
-    node.name = _FOLLOWED  # its own name is that of a global one, where it calls itself
+    node.name, node.decorator_list = _FOLLOWED, []  # where it calls itself, its name is global
     outer.body = [node]
     module = ast.fix_missing_locations(ast.Module([outer], []))
     whole = compile(module, code.co_filename, "exec", dont_inherit=True)

@@ -19,6 +19,7 @@ from typing import cast
 
 Definition = ast.FunctionDef | ast.Lambda
 Places = dict[tuple[str, int], list[Definition]]
+_ByCode = dict[CodeType, list[Definition]]
 _NAMED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 _LOOPS = ("<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>")  # code of its own in some Pythons
 
@@ -56,7 +57,7 @@ def definition(function: FunctionType) -> Definition:
         raise Unreadable("its source cannot be found", "define it in a file or a notebook")
     try:
         module = text, file, code.co_flags & _FUTURES
-        places, codes = _compiled(*module)
+        places, codes, by_code = _compiled(*module)
     except (SyntaxError, ValueError) as error:
         raise Unreadable(f"its source cannot be parsed ({error})", "mend its file") from error
     if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
@@ -64,8 +65,10 @@ def definition(function: FunctionType) -> Definition:
         if code.co_filename == "<string>":
             advice = "define it in a file: it was made of a text, as by exec"
         raise Unreadable("its source is not what it was made of", advice)
-    nodes = [node for node in _candidates(places, code) if _contains(node, code)]
-    if not nodes or len({ast.dump(node) for node in nodes}) > 1:
+    if code not in by_code:
+        by_code[code] = [node for node in _candidates(places, code) if _contains(node, code)]
+    nodes = by_code[code]
+    if not nodes or (len(nodes) > 1 and len(set(map(ast.dump, nodes))) > 1):
         advice = "give each function a line of its own"
         raise Unreadable("its source cannot be distinguished from others on the same line", advice)
     return nodes[0]
@@ -96,8 +99,11 @@ def _file_and_text(function: FunctionType) -> tuple[str, str]:
 
 
 @functools.lru_cache(maxsize=128)
-def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeType]]:
-    """Return the functions of a module by their names and first lines, and all code inside it."""
+def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeType], _ByCode]:
+    """Return the functions of a module by their names and first lines, and all code inside it.
+
+    With a place for the functions by their code.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python has said once what it thinks of this text
         tree = ast.parse(text, file)
@@ -106,7 +112,7 @@ def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeT
     for node in ast.walk(tree):
         if isinstance(node, Definition):
             places.setdefault((_name(node), _first_line(node)), []).append(node)
-    return places, frozenset(codes_in(module))
+    return places, frozenset(codes_in(module)), {}
 
 
 @functools.lru_cache(maxsize=128)

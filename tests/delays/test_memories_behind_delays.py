@@ -1,5 +1,7 @@
 """Memories that delayed signals carry: jumps and turns arrive, and nothing turns at a seam."""
 
+import functools
+
 import control as ct
 import numpy as np
 import pytest
@@ -71,15 +73,23 @@ def test_every_jump_of_a_saw_arrives_at_a_stop(rtol, delays):
     assert run.statistics.accepted < 1500
 
 
+PLACES = np.append(0.0, np.linspace(0.61, 11.83, 23))
+
+
+@functools.cache
+def late_play(signal):
+    """A play behind a delay: the operator over dense samples, at the places."""
+    dense = np.linspace(0.0, 12.0, 240_001)
+    late = np.array([signal(w - LATE) if w >= LATE else 0.0 for w in dense])
+    return np.interp(PLACES, dense, through_play(late, R))
+
+
 @pytest.mark.parametrize("rtol", TOLERANCES)
 @pytest.mark.parametrize("signal", [staircase, jumping_sine])
 def test_a_play_behind_a_delay_is_that_of_the_late_signal(signal, rtol):
     """Against the operator over dense samples."""
     compiled = of(signal, LatePlay(m_r=1.0, m_l=1.0, c_r=R, c_l=-R), 0.45, LATE - 0.45)
-    timepts = np.append(0.0, np.linspace(0.61, 11.83, 23))
-    dense = np.linspace(0.0, 12.0, 240_001)
-    late = np.array([signal(w - LATE) if w >= LATE else 0.0 for w in dense])
-    exact = np.interp(timepts, dense, through_play(late, R))
+    timepts, exact = PLACES, late_play(signal)
     run = nlctl.input_output_response(compiled, timepts, rtol=rtol, atol=rtol / 100)
     assert run.outputs[0] == pytest.approx(exact, abs=1e-4 + 30 * rtol)
 

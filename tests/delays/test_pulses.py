@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -32,8 +33,7 @@ def integrated(**fields):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("engine", "shape"), crossed([*ENGINES], [*SHAPES]))
 @given(place=places, height=st.floats(0.02, 0.09))
 @settings(max_examples=3, phases=[Phase.generate])
 def test_a_pulse_of_how_a_delay_varies(engine, shape, place, height):
@@ -50,8 +50,7 @@ def test_a_pulse_of_how_a_delay_varies(engine, shape, place, height):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("engine", "shape"), crossed([*ENGINES], [*SHAPES]))
 @given(place=places)
 @settings(max_examples=3, phases=[Phase.generate])
 def test_a_pulse_of_a_history(engine, shape, place):
@@ -64,8 +63,7 @@ def test_a_pulse_of_a_history(engine, shape, place):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("lag", [0.05, 0.01])
+@pytest.mark.parametrize(("engine", "lag"), crossed([*ENGINES], [0.05, 0.01]))
 @given(place=places)
 @settings(max_examples=3, phases=[Phase.generate])
 def test_a_pulse_that_a_run_made_itself(engine, lag, place):

@@ -49,7 +49,7 @@ USES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", parted(ATTRIBUTES))
+@pytest.mark.parametrize("name", parted(ATTRIBUTES, part=6))
 @pytest.mark.parametrize("use", USES.values(), ids=USES)
 def test_attributes_of_a_users_class_mean_nothing(name, use):
     """Every name that classes of nlctl have, with values that they might have."""

@@ -7,6 +7,7 @@ import math
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -49,9 +50,7 @@ def parabola(holds):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", WINDOWS)
+@pytest.mark.parametrize(("rtol", "method", "name"), crossed([1e-6, 1e-9], [*METHODS], [*WINDOWS]))
 def test_narrow_windows_are_passed_on_the_way_up_and_down(name, method, rtol):
     holds, (low, high) = WINDOWS[name]
     width = at_height(high) - at_height(low)

@@ -5,6 +5,7 @@ import math
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from exported import evaluated
 from plain_plan import interpreted
 
@@ -88,8 +89,7 @@ def points(system, count=3):
     return [(0.0, rng.normal(size=system.nstates), rng.normal(size=1)) for _ in range(count)]
 
 
-@pytest.mark.parametrize("n", ROWS)
-@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize(("n", "kind"), crossed([*ROWS], [*SYSTEMS]))
 def test_rates_are_those_of_numpy(kind, n):
     """Also where rows are exchanged: the diagonal may be 0."""
     system = SYSTEMS[kind](n)

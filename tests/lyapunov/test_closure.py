@@ -121,7 +121,7 @@ def test_with_the_published_gains_none_closes_whatever_the_weights(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("number", [1, pytest.param(2, marks=pytest.mark.weekly)])
 def test_no_weights_have_less_than_the_least_bound(number):
     """C_0 of random weights on boxes of several sizes, proved, against what it is at least."""
     loop, found, gains, _, sides = published(number)

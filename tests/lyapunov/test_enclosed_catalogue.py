@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from examples import many
+from examples import crossed, many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -70,8 +70,7 @@ ROOTS = {
 EXPONENTS = {"sqrt": 0.5, "power 0.5": 0.5, "power 1.5": 1.5, "power 1/3": 1 / 3}
 
 
-@pytest.mark.parametrize("inner", NOT_NEGATIVE)
-@pytest.mark.parametrize("root", ROOTS)
+@pytest.mark.parametrize(("inner", "root"), crossed([*NOT_NEGATIVE], [*ROOTS]))
 @given(a=ENDS, b=ENDS, share=st.floats(0, 1))
 @settings(max_examples=many(20, part=4))
 def test_roots_of_what_is_not_negative_are_finite_around_zero(root, inner, a, b, share):
@@ -109,8 +108,7 @@ FRICTIONS = {
 }
 
 
-@pytest.mark.parametrize("name", FRICTIONS)
-@pytest.mark.parametrize("law", ["sliding mode", "known sign"])
+@pytest.mark.parametrize(("name", "law"), crossed([*FRICTIONS], ["sliding mode", "known sign"]))
 def test_plants_of_order_one_have_certificates(name, law):
     """The filtered error of order 1 is e itself; what runs do stays within."""
     plant = nlctl.PureFeedback(order=1, f=nlctl.equation(FRICTIONS[name]))

@@ -43,7 +43,7 @@ def test_the_function_falls_above_the_floor_of_completed_squares():
 @pytest.mark.parametrize(
     ("equations", "floor"),
     [
-        (lambda z: rates(z, sigma=0.0), 1.001 * FLOOR),
+        pytest.param(lambda z: rates(z, sigma=0.0), 1.001 * FLOOR, marks=pytest.mark.weekly),
         (lambda z: rates(z, sign=-1.0), 1.001 * FLOOR),
         (rates, 0.3 * FLOOR),
     ],

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from own_relay import Side
 
 import nlctl
@@ -133,8 +134,9 @@ GIVEN = {
 }
 
 
-@pytest.mark.parametrize("given", GIVEN)
-@pytest.mark.parametrize("method", ["auto", "tsit5", "rodas5p", "taylor"])
+@pytest.mark.parametrize(
+    ("given", "method"), crossed([*GIVEN], ["auto", "tsit5", "rodas5p", "taylor"])
+)
 def test_samples_of_an_input_are_no_chattering(given, method):
     """A lag at rest goes from sample to sample, and its rate is rounding; it follows its input."""
     lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
@@ -144,9 +146,11 @@ def test_samples_of_an_input_are_no_chattering(given, method):
         np.testing.assert_allclose(made.outputs, 1 - np.exp(-2 * DENSE), atol=1e-7)
 
 
-@pytest.mark.parametrize("given", GIVEN)
 @pytest.mark.parametrize(
-    "part", [nlctl.DeadZone, nlctl.Saturation, nlctl.Backlash, nlctl.Relay, nlctl.Quantiser]
+    ("given", "part"),
+    crossed(
+        [*GIVEN], [nlctl.DeadZone, nlctl.Saturation, nlctl.Backlash, nlctl.Relay, nlctl.Quantiser]
+    ),
 )
 def test_nor_are_they_behind_a_nonlinearity(part, given):
     loop = nlctl.actuators.cascade({"part": part(), "lag": nlctl.Lag()})

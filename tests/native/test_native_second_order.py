@@ -5,6 +5,7 @@ import re
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from scipy.integrate import solve_ivp
 
 import nlctl
@@ -41,9 +42,9 @@ def of_plant(made):
     return made.states[[label.startswith("plant") for label in made.state_labels]]
 
 
-@pytest.mark.parametrize("method", ["auto", "tsit5", "rodas5p"])
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
-@pytest.mark.parametrize("T", [0.05, 0.2])
+@pytest.mark.parametrize(
+    ("method", "rtol", "T"), crossed(["auto", "tsit5", "rodas5p"], [1e-4, 1e-6, 1e-8], [0.05, 0.2])
+)
 def test_a_relay_behind_a_lag_comes_to_rest(T, method, rtol):
     """Its rate falls as exp(-2 t / (3 T)) when it is small: to nothing at 40 T."""
     times = np.linspace(0, 50 * T, 101)

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from rows import each_row
 from scipy.optimize import brentq
 
@@ -63,8 +64,7 @@ WAVE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
-@pytest.mark.parametrize("name", WAVE)
+@pytest.mark.parametrize(("method", "name"), crossed(["tsit5", "rodas5p"], [*WAVE]))
 def test_the_equivalent_control_is_the_inverse_of_the_bends(name, method):
     """From x = 0 with a drift of a sine: x stays, and v is the one with bent(v) = drift."""
     bent, size, inverse = WAVE[name]

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 from nlctl.native import Status
@@ -44,8 +45,7 @@ def run(function, last, start=(1.0, 0.0), **given):
 
 
 @METHODS
-@pytest.mark.parametrize("stairs", STAIRS)
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6])
+@pytest.mark.parametrize(("stairs", "rtol"), crossed([*STAIRS], [1e-3, 1e-6]))
 def test_each_step_of_a_staircase_is_another_place(stairs, rtol, method):
     """x' = x: a step of x by 1 is less than tolerances of x, and each is passed once."""
     function, integral = STAIRS[stairs]
@@ -78,8 +78,7 @@ def test_what_comes_back_to_one_place_still_chatters(method):
     assert "'x[2]'' of block 'own' jumps between" in made.message
 
 
-@pytest.mark.parametrize("method", ["tsit5", "auto"])
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize(("method", "rtol"), crossed(["tsit5", "auto"], [1e-6, 1e-9]))
 def test_levels_that_are_passed_ever_faster_end_a_run_before_their_end(rtol, method):
     """z' = z^2 is infinite at t = 1: no run counts its levels to there, or stays where it is."""
     with pytest.raises(nlctl.errors.ChatteringError, match="moves ever faster") as caught:

@@ -27,7 +27,7 @@ def open_time(signal, end, places=200_001):
     return np.diff(ends)[signal(middles) > 0].sum(), len(roots)
 
 
-SLOW = ["faster"]
+LONG = ["faster"]  # each day "a product of states" has as many waves in a step
 WAVES = {
     "a product of states": (lambda a, b: np.sin(300 * a * b) - 0.99, 1.5),
     "faster": (lambda a, b: np.sin(1000 * a * b) - 0.99, 2.0),
@@ -42,7 +42,7 @@ WAVES = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(k, marks=[pytest.mark.slow] * (k in SLOW)) for k in WAVES]
+    "name", [pytest.param(k, marks=[pytest.mark.weekly] * (k in LONG)) for k in WAVES]
 )
 def test_every_window_is_met(name):
     """x0 = sin t, x1 = cos t, and x2 counts the time in which a function of these is above 0."""

@@ -32,13 +32,17 @@ def diagram(*lags):
     return nlctl.interconnect(blocks, outputs=["u"])
 
 
-@engines
 @pytest.mark.parametrize(
-    ("system", "block", "start"),
+    ("system", "block", "start", "engine"),
     [
-        (lagged(1e-3), "own", [1.0, 0.0]),
-        pytest.param(lagged(0.05), "own", [1.0, 0.0], marks=pytest.mark.weekly),
-        pytest.param(diagram(0.05), "sign", {"plant.x[0]": 1.0}, marks=pytest.mark.slow),
+        (lagged(1e-3), "own", [1.0, 0.0], "native"),
+        pytest.param(lagged(1e-3), "own", [1.0, 0.0], "python-control", marks=pytest.mark.slow),
+        (diagram(0.05), "sign", {"plant.x[0]": 1.0}, "native"),
+        pytest.param(
+            diagram(0.05), "sign", {"plant.x[0]": 1.0}, "python-control", marks=pytest.mark.weekly
+        ),
+        pytest.param(lagged(0.05), "own", [1.0, 0.0], "native", marks=pytest.mark.weekly),
+        pytest.param(lagged(0.05), "own", [1.0, 0.0], "python-control", marks=pytest.mark.weekly),
     ],
 )
 def test_a_sign_behind_a_lag_ends_with_the_reason(system, block, start, engine):

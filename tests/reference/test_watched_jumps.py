@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -104,8 +105,10 @@ def test_what_jumps_back_from_0_is_no_event_and_what_begins_there_ends_no_run(ho
     assert made.events.set_index("which").loc["begins", "time"] == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("how", [WAYS[n] for n in ("tsit5", "rodas5p", "python-control")])
-@pytest.mark.parametrize("level", [0.0, 0.3, -0.79])
+@pytest.mark.parametrize(
+    ("how", "level"),
+    crossed([WAYS[n] for n in ("tsit5", "rodas5p", "python-control")], [0.0, 0.3, -0.79]),
+)
 def test_a_memory_is_what_it_has_become_within_a_step(level, how):
     """A play of 0.2 behind cos t: cos t + 0.2 until pi, cos t - 0.2 until 2 pi."""
     source = ct.nlsys(lambda t, x, u, p: [x[1], -x[0]], lambda t, x, u, p: x[0], states=2,

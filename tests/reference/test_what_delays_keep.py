@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from scipy.integrate import quad
 
 import nlctl
@@ -59,9 +60,12 @@ PULSES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
-@pytest.mark.parametrize("begins", [source, of_ramp], ids=["of t", "of a state"])
-@pytest.mark.parametrize("name", PULSES)
+@pytest.mark.parametrize(
+    ("rtol", "begins", "name"),
+    crossed(
+        [1e-6, 1e-9], dict(zip(["of t", "of a state"], [source, of_ramp], strict=True)), [*PULSES]
+    ),
+)
 def test_a_pulse_arrives_behind_a_delay_that_nothing_else_happens_in(name, begins, rtol, run):
     """At rest before and behind it; the delay is 700 times as long as the pulse."""
     function, area = PULSES[name]
@@ -172,10 +176,10 @@ def test_a_step_that_reads_the_past_ends_in_the_next_piece():
 # -- steps over events -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
-@pytest.mark.parametrize("width", [1e-2, 1e-3, 1e-4])
-@pytest.mark.parametrize("speed", [1.0, 7.0])
+@pytest.mark.parametrize(
+    ("engine", "rtol", "width", "speed"),
+    crossed([*ENGINES], [1e-6, 1e-9], [1e-2, 1e-3, 1e-4], [1.0, 7.0]),
+)
 def test_a_hat_of_a_state_has_its_area(width, speed, rtol, engine):
     """From rest a step leads over its edges and sees 0 at both ends, also right up to the top."""
     places = [0, 2, 2 + width / 2, 2 + width, 99]

@@ -222,7 +222,7 @@ def test_parameters_keep_their_names():
         f"controller.sampling.{field}" for field in declared_params(nlctl.sampling.Sampling)
     }
     assert set(known) <= set(nlctl.parameters(loop).index)
-    times = np.linspace(0, 0.5, 11)
+    times = np.linspace(0, 0.25, 6)
     runs = [
         nlctl.input_output_response(loop, times, params={"law.beta": 4.0}, engine=engine).outputs
         for engine in ("native", "python-control")

@@ -4,12 +4,12 @@ import control as ct
 import numpy as np
 import pytest
 from closed_form_runs import CORNERS, A, P, R, Tank, integral, source
+from examples import crossed
 
 import nlctl
 
 
-@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
-@pytest.mark.parametrize("law", CORNERS)
+@pytest.mark.parametrize(("method", "law"), crossed(["auto", "taylor", "rodas5p"], [*CORNERS]))
 def test_play_that_turns_at_a_corner(law, method):
     """v = A - c from t = P on, wherever that is, until u has fallen by 2 c."""
     gap = nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3)
@@ -88,8 +88,10 @@ def by_relay():
     return [rule, relay, moving], {"relay.on": 1.0, "rule.g": 0.0}, 0.6
 
 
-@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
-@pytest.mark.parametrize("cause", [by_time, by_crossing, by_clock, by_relay])
+@pytest.mark.parametrize(
+    ("method", "cause"),
+    crossed(["auto", "taylor", "rodas5p"], [by_time, by_crossing, by_clock, by_relay]),
+)
 def test_reset_by_what_makes_its_guard_jump(cause, method):
     """Behind the reset at T h = a + q (t - T), and T moves as the cause says."""
     blocks, moves, T = cause()
@@ -125,9 +127,9 @@ TENTS = {
 }
 
 
-@pytest.mark.parametrize("above", [0.0, 1e-4, -1e-4])
-@pytest.mark.parametrize("delay", [None, 0.2])
-@pytest.mark.parametrize("law", TENTS)
+@pytest.mark.parametrize(
+    ("above", "delay", "law"), crossed([0.0, 1e-4, -1e-4], [None, 0.2], [*TENTS])
+)
 def test_memory_that_is_touched_at_a_corner(law, delay, above):
     """The tip A of a tent comes to A - r, where the memory stands: v = max(m, A - r) from then."""
     gap = nlctl.block(

@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from closed_form_runs import CORNERS, A, P, source
+from examples import crossed
 
 import nlctl
 from nlctl.errors import CompileError
@@ -80,8 +81,7 @@ def test_play_behind_a_delay_of_a_state():
     assert made.derivatives[0, :, -1] == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("second", [False, True])
-@pytest.mark.parametrize("law", CORNERS)
+@pytest.mark.parametrize(("second", "law"), crossed([False, True], [*CORNERS]))
 def test_play_that_turns_at_a_corner_behind_delays(law, second):
     """v = A - c from t = P + d on, wherever that is, until u has fallen by 2 c."""
     wires = [wire(D, ("u",)), wire(0.15, ("y",), ("far",), "other")][: 1 + second]
@@ -117,8 +117,9 @@ def test_play_behind_a_delay_of_samples():
     assert made["v", "gap.c_l"][2:] == pytest.approx([0, 0, -1], abs=1e-8)
 
 
-@pytest.mark.parametrize("start", [0.2, 0.9])
-@pytest.mark.parametrize("by", ["source.R", "source.x(0)", "wire.delay", "gap.c_r"])
+@pytest.mark.parametrize(
+    ("start", "by"), crossed([0.2, 0.9], ["source.R", "source.x(0)", "wire.delay", "gap.c_r"])
+)
 def test_play_behind_a_delay_of_what_jumps(by, start):
     """Driven up to the jump of x = x0 + R t at P, by -h: it keeps P - r, or falls behind it."""
     height, r, rate = (0.35, 0.3, 1.3) if start < 0.5 else (1.1, 0.3, 1.3)

@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from closed_form_runs import Tank
+from examples import crossed
 
 import nlctl
 
@@ -42,8 +43,7 @@ STARTS = {
 }
 
 
-@pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
-@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize(("method", "start"), crossed(["auto", "taylor", "rodas5p"], [*STARTS]))
 def test_play_behind_a_relay_that_switches_at_the_start(start, method):
     """v stands where the relay has moved it to until x, with the relay on, moves it on."""
     e, width, v, slopes = STARTS[start]

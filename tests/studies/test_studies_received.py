@@ -12,6 +12,7 @@ from pathlib import Path
 import control as ct
 import pytest
 from command_line import nlctl_here
+from examples import crossed
 from studies_example import HEAD, write
 from test_studies_trust import (
     PLACES,
@@ -93,8 +94,10 @@ def with_arguments(parts, name, arguments):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", [in_options, in_choices, in_comparison, in_metrics, nested])
-@pytest.mark.parametrize("name", ARGUMENTS)
+@pytest.mark.parametrize(
+    ("where", "name"),
+    crossed([in_options, in_choices, in_comparison, in_metrics, nested], [*ARGUMENTS]),
+)
 def test_a_study_alone_calls_nobody_elses_function(home, name, where):
     """Wherever a file names it, with whatever arguments."""
     base = home.parent

@@ -1,5 +1,6 @@
 """How many examples a property is tried on."""
 
+import itertools
 import os
 
 import pytest
@@ -22,3 +23,28 @@ def parted(rows, part=3):
     return [
         pytest.param(r, marks=pytest.mark.weekly) if i % part else r for i, r in enumerate(rows)
     ]
+
+
+def crossed(*tables):
+    """Rows of a test of all combinations: every value each day, the other combinations weekly.
+
+    A table is a list of values, or a dict of values by their names.
+    """
+    named = [
+        [*table.items()] if isinstance(table, dict) else [(_name_of(v), v) for v in table]
+        for table in tables
+    ]
+    part = min(3, sorted(map(len, named))[-2])  # on the diagonals each value of each table is
+    rows = []
+    for row in itertools.product(*map(enumerate, named)):
+        marks = [pytest.mark.weekly] if sum(place for place, _ in row) % part else []
+        name = "-".join(name for _, (name, _) in row)
+        rows.append(pytest.param(*(v for _, (_, v) in row), marks=marks, id=name))
+    return rows
+
+
+def _name_of(value):
+    """Name of a value in the name of a test."""
+    if isinstance(value, dict):  # how a run is made
+        return "-".join(map(str, value.values()))
+    return getattr(value, "__name__", str(value))

@@ -42,6 +42,7 @@ def _switches(
     high = np.where(switches, np.clip(root + near, begin, end), end)
     low = np.where(np.sign(at(low)) == np.sign(first), low, begin)
     high = np.where(np.sign(at(high)) == np.sign(last), high, end)
+    high = np.where(switches, high, low)  # nothing to search for
     until = _last(lambda t: np.sign(at(t)) == np.sign(first), low, high)
     behind = np.nextafter(_last(lambda t: np.sign(at(t)) != np.sign(last), low, high), np.inf)
     never = np.where(switches, 0.0, np.inf)

@@ -70,8 +70,16 @@ def test_every_proof_for_loops_is_rechecked():
     assert all(issubclass(kind.result, Certificate) for kind in FOR_LOOPS)
 
 
+# a sliding mode is proved, saved and rechecked each day in test_recheck
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", FOR_LOOPS, ids=lambda kind: kind.name)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=[pytest.mark.weekly] * (kind.name == "sliding mode"))
+        for kind in FOR_LOOPS
+    ],
+    ids=lambda kind: kind.name,
+)
 def test_a_loop_is_proved_by_its_kind_alone(kind, tmp_path):
     """It fits no other kind, closes a box, and its file is believed with what it claims."""
     loop = LOOPS[kind.name]()

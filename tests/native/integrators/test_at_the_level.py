@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -185,8 +186,10 @@ def test_a_break_point_at_which_a_condition_jumps_is_noted_as_well(how):
     np.testing.assert_allclose(declared(made), [1.0, 2.5], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("how", [how for how in HOW if how.get("method") != "taylor"])
-@pytest.mark.parametrize("off", [1e-300, 1.2e-308, 5e-324])
+@pytest.mark.parametrize(
+    ("how", "off"),
+    crossed([how for how in HOW if how.get("method") != "taylor"], [1e-300, 1.2e-308, 5e-324]),
+)
 def test_a_level_whose_product_with_a_value_is_rounded_to_zero(how, off):
     """A relay that goes on where its input has come from 0: signs are compared, no product."""
     loop = nlctl.interconnect(

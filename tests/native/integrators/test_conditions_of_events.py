@@ -6,6 +6,7 @@ No rate of a state depends on them, so that error control sees nothing of the pu
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -62,9 +63,9 @@ def run(diagram, method, rtol, **kwargs):
 SINCE_A_HALF = np.where(TIMES < 0.5, TIMES, (TIMES - 0.5) % 1.0)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("rtol", TOLERANCES)
-@pytest.mark.parametrize("source", [signal, ramp])
+@pytest.mark.parametrize(
+    ("method", "rtol", "source"), crossed([*METHODS], [*TOLERANCES], [signal, ramp])
+)
 def test_a_guard_behind_a_pulse(source, method, rtol):
     """A pulse of 3 ms of t, or of a state, resets a clock."""
     diagram = nlctl.interconnect({"s": source(pulse), "w": Since()}, outputs=["since"])
@@ -80,9 +81,9 @@ def test_a_guard_with_a_pulse_of_its_own(method, rtol):
     np.testing.assert_allclose(found.outputs.reshape(-1), SINCE_A_HALF, atol=max(rtol, 1e-8))
 
 
-@pytest.mark.parametrize("method", WITH_MEMORY)
-@pytest.mark.parametrize("rtol", TOLERANCES)
-@pytest.mark.parametrize("source", [signal, ramp])
+@pytest.mark.parametrize(
+    ("method", "rtol", "source"), crossed([*WITH_MEMORY], [*TOLERANCES], [signal, ramp])
+)
 def test_a_play_behind_a_pulse(source, method, rtol):
     """A play of half-width 1/4 is drawn to 3/4 by a pulse of height 1, and back to 1/4 behind it.
 
@@ -186,9 +187,7 @@ def since_window(function, width):
     return nlctl.block(Since(), "w")
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("kink", KINKS)
+@pytest.mark.parametrize(("method", "width", "kink"), crossed([*METHODS], [*WIDTHS], [*KINKS]))
 def test_an_event_function_below_zero_around_its_kink(kink, width, method):
     function, before, behind = KINKS[kink]
     diagram = nlctl.compile(ramp(lambda x: x))
@@ -205,9 +204,7 @@ def test_an_event_function_below_zero_around_its_kink(kink, width, method):
     np.testing.assert_allclose(own, expected, rtol=0, atol=max(1e-7, 1e-3 * width) + 1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("kink", KINKS)
+@pytest.mark.parametrize(("method", "width", "kink"), crossed([*METHODS], [*WIDTHS], [*KINKS]))
 def test_a_guard_that_falls_around_its_kink(kink, width, method):
     diagram = since_window(KINKS[kink][0], width)
     y = nlctl.input_output_response(

@@ -3,15 +3,17 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
 AT, WIDTH, END = 5.0, 0.01, 20.0
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-6, 1e-8, 1e-10])
-@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
-@pytest.mark.parametrize("level", [0.0, 0.9])
+@pytest.mark.parametrize(
+    ("rtol", "method", "level"),
+    crossed([1e-3, 1e-5, 1e-6, 1e-8, 1e-10], ["tsit5", "rodas5p", "taylor", "auto"], [0.0, 0.9]),
+)
 def test_a_relay_switches_on_the_flank(level, method, rtol):
     """A line from the start of the step says that 0 is next to the crest; it is far from there."""
     parabola = ct.nlsys(

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -29,9 +30,8 @@ def run(count, rate, how):
     return events[events["which"] != "comparison"]
 
 
-@pytest.mark.parametrize("how", WAYS, ids=lambda how: "-".join(how.values()))
+@pytest.mark.parametrize(("how", "sign"), crossed(WAYS, [1.0, -1.0]))
 @pytest.mark.parametrize(("count", "shift"), COUNTS.values(), ids=COUNTS)
-@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_ramp(count, shift, sign, how):
     """s = 0.2 +- t: four events, all in the direction of the ramp."""
     events = run(count, lambda t: sign, how)
@@ -40,8 +40,7 @@ def test_a_ramp(count, shift, sign, how):
     np.testing.assert_allclose(events["time"], first + np.arange(4), atol=1e-6)
 
 
-@pytest.mark.parametrize("how", WAYS, ids=lambda how: "-".join(how.values()))
-@pytest.mark.parametrize("name", ["floor", "round", "%"])
+@pytest.mark.parametrize(("how", "name"), crossed(WAYS, ["floor", "round", "%"]))
 def test_a_sine(name, how):
     """s = 0.2 + 3 sin(t): each event is at an integer, in the direction of cos(t)."""
     count, shift = COUNTS[name]

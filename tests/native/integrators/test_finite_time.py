@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -24,8 +25,7 @@ def run(law, **how):
     )
 
 
-@pytest.mark.parametrize("method", [None, "rodas5p"])
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize(("method", "law"), crossed([None, "rodas5p"], LAWS))
 def test_rest_is_reached(law, method):
     response = run(law, method=method)
     assert response.success

@@ -4,6 +4,7 @@ and windows at the top of a swing: each is seen, by every method, and when it is
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -33,8 +34,7 @@ def passes():
     return nlctl.compile(nlctl.block(Passes(), "passes"))
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize(("method", "rtol"), crossed([*METHODS], [1e-4, 1e-6, 1e-9]))
 def test_a_narrow_guard_around_a_kink_falls_once_and_in_time(passes, method, rtol):
     """At the kink of the rate and elsewhere, and with both kinks within the guard."""
     rng = np.random.default_rng(0)

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -25,7 +26,7 @@ WAVES = {
 }
 
 
-@pytest.mark.parametrize("wave", WAVES.values(), ids=WAVES)
+@pytest.mark.parametrize(("wave", "turns"), crossed(WAVES, [0, 1_000_000]))
 @pytest.mark.parametrize(
     ("actuator", "behind"),
     [
@@ -34,7 +35,6 @@ WAVES = {
     ],
     ids=["stop", "play"],
 )
-@pytest.mark.parametrize("turns", [0, 1_000_000])
 def test_every_frequency(wave, actuator, behind, turns):
     """u jumps to -u at (pi - 0.3) / w: the play comes to u + r, the stop to -r."""
     # The switch is one of floats, and the machine's product and sum may be contracted: which of

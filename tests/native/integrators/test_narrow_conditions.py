@@ -7,6 +7,7 @@ is known: 2 (asin 0.501 - asin 0.5) until t = 3.
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -44,8 +45,7 @@ def swinging(f):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("how", WAYS, ids=IDS)
-@pytest.mark.parametrize("f", EVERY.values(), ids=EVERY)
+@pytest.mark.parametrize(("how", "f"), crossed(dict(zip(IDS, WAYS, strict=True)), EVERY))
 def test_a_band_of_a_state(f, how):
     with np.errstate(all="ignore"):
         response = nlctl.input_output_response(

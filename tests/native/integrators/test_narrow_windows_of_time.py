@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -36,10 +37,19 @@ FUNCTIONS = {  # of t, their levels, and where they are at a level
 }
 
 
-@pytest.mark.parametrize("how", [{"method": "tsit5"}, {"method": "rodas5p"},
-                                 {"method": "taylor"}, {"engine": "python-control"}])  # fmt: skip
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize(
+    ("how", "form", "name"),
+    crossed(
+        [
+            {"method": "tsit5"},
+            {"method": "rodas5p"},
+            {"method": "taylor"},
+            {"engine": "python-control"},
+        ],
+        [*FORMS],
+        [*FUNCTIONS],
+    ),
+)
 def test_how_long_windows_are_open(name, form, how):
     function, level, places = FUNCTIONS[name]
     pulsed = ct.nlsys(

@@ -9,6 +9,7 @@ import functools
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -64,8 +65,7 @@ beyond = st.floats(-6, -0.03).map(lambda power: 10.0**power)  # the band, in amp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("driven", ["by time", "by a clock"])
+@pytest.mark.parametrize(("method", "driven"), crossed([*METHODS], ["by time", "by a clock"]))
 @given(A=amplitudes, w=frequencies, d=beyond, periods=st.integers(1, 5))
 @example(A=1.5, w=1.0, d=0.141, periods=2)
 @example(A=1.0, w=1.0, d=1e-4, periods=5)

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed, parted
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -114,8 +115,7 @@ ends = st.floats(0.05, 1.6).filter(lambda t: min(abs(t - s) for s in (*TIMES, 0.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ACTUATORS)
-@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+@pytest.mark.parametrize(("name", "method"), crossed([*ACTUATORS], ["tsit5", "rodas5p", "taylor"]))
 @given(heights=heights, end=ends)
 @example(heights=(-0.15, 0.01, 0.01), end=0.52)
 @settings(max_examples=10)
@@ -129,7 +129,7 @@ def test_behind_a_corner(name, method, heights, end):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ACTUATORS)
+@pytest.mark.parametrize("name", parted(ACTUATORS, part=2))
 @given(gain=st.floats(-3.0, 2.0).filter(lambda a: abs(a) > 0.01), end=st.floats(0.05, 1.6))
 @settings(max_examples=10)
 def test_behind_a_sampled_block(name, gain, end):
@@ -142,7 +142,7 @@ def test_behind_a_sampled_block(name, gain, end):
     assert run.outputs[0, -1] == pytest.approx(wanted, abs=2e-7)
 
 
-@pytest.mark.parametrize("name", ACTUATORS)
+@pytest.mark.parametrize("name", parted(ACTUATORS))
 @given(heights=heights, end=ends)
 @settings(max_examples=10)
 def test_behind_a_delay(name, heights, end):

@@ -6,6 +6,7 @@ Nothing but f moves fast, and from rest: the integrals are known.
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import erfc, gamma, gammaln, ive
@@ -109,8 +110,13 @@ def test_integrals_of_pulses_with_parameters(name, how):
         assert run.outputs[-1] == pytest.approx(integral, rel=1e-5)
 
 
-@pytest.mark.parametrize("how", WAYS, ids=IDS)
-@pytest.mark.parametrize("name", [name for name in CONDITIONS if name != "power of a wave"])
+@pytest.mark.parametrize(
+    ("how", "name"),
+    crossed(
+        dict(zip(IDS, WAYS, strict=True)),
+        [name for name in CONDITIONS if name != "power of a wave"],
+    ),
+)
 def test_windows_of_pulses(name, how):
     above = CONDITIONS[name]
     compared = flowing(lambda z: 1000.0 if above(z) > 0 else 0.0)

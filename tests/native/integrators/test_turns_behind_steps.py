@@ -7,6 +7,7 @@ as closely once counted as turns that rounding repeats, behind which none was lo
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 
@@ -47,9 +48,12 @@ def driven() -> object:
 LOOP = driven()
 
 
-@pytest.mark.parametrize("steep", [1e-2, 1e-5, 1e-9])
-@pytest.mark.parametrize("how", ["tsit5", "rodas5p", "taylor", "auto", "python-control"])
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize(
+    ("steep", "how", "rtol"),
+    crossed(
+        [1e-2, 1e-5, 1e-9], ["tsit5", "rodas5p", "taylor", "auto", "python-control"], [1e-6, 1e-9]
+    ),
+)
 def test_plays_turn_where_their_input_does(how, steep, rtol):
     """The extremes of the input behind each step are kept, in whatever time it rises."""
     begins = 0.7 * np.arange(LEVELS.size)
@@ -89,8 +93,9 @@ def test_their_derivatives_are_those_of_the_extremes(parameter):
     np.testing.assert_allclose(np.ravel(run["y", parameter]), np.ravel(differences), atol=1e-6)
 
 
-@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
-@pytest.mark.parametrize("later", [1e-2, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize(
+    ("method", "later"), crossed(["tsit5", "rodas5p", "taylor"], [1e-2, 1e-4, 1e-6, 1e-8])
+)
 def test_plays_whose_inputs_turn_right_after_one_another(later, method):
     """sin(t - k later), in 16 turns each: all of them are seen, however close the next one is."""
     end, late, half_gap = 50.0, later * np.arange(6), 0.25

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import crossed
 
 import nlctl
 from nlctl import actuators
@@ -59,8 +60,9 @@ def run(name, unit, method):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
-@pytest.mark.parametrize("name", [*ACTUATORS, *FUNCTIONS])
+@pytest.mark.parametrize(
+    ("method", "name"), crossed(["tsit5", "rodas5p", "taylor"], [*ACTUATORS, *FUNCTIONS])
+)
 def test_another_unit_is_another_exponent(name, method):
     """To the bit: nothing in the engine is compared with a number of its own."""
     # A mode has no unit, so that what the stiff method eliminates next to it rounds otherwise.

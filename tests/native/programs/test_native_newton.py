@@ -193,7 +193,7 @@ def test_a_loop_is_audited():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [_MOST, _MOST + 1])
+@pytest.mark.parametrize("n", [pytest.param(_MOST, marks=pytest.mark.weekly), _MOST + 1])
 def test_many_signals_in_a_loop(n):
     """Each is the cosine of its right neighbour and of itself: all are equal."""
 

@@ -19,7 +19,9 @@ def moved(row, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("key", ["AT1", "AFC29", "NN.03", "CC1", "SC"])
+@pytest.mark.parametrize("key", [
+    "AT1", pytest.param("AFC29", marks=pytest.mark.weekly), "NN.03", "CC1", "SC",
+])  # fmt: skip
 def test_machine_code_is_python_controls_at_points_of_a_run(key):
     """Every block is read as expressions, and the audit compares with its equations."""
     row = next(row for row in published.ROWS if row.key == key)

@@ -75,7 +75,8 @@ FORMULAS = {  # and what they are on fine samples
 }  # fmt: skip
 
 
-LONG = ("a relay and a delay", "a relay and a delay that varies", "backlash")  # in the reference
+# in the reference; a saturation switches as often, and a relay is in the clock's law as well
+LONG = ("a relay and a delay", "a relay and a delay that varies", "backlash", "relay", "dead zone")
 CASES = [
     pytest.param(
         name, engine, marks=pytest.mark.weekly if engine != "native" and name in LONG else ()
