@@ -17,7 +17,7 @@ from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
-from .parts import part_at, part_of_one, part_of_row
+from .parts import names_read, part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
     OUTSIDE,
@@ -290,9 +290,8 @@ class Expressions(ast.NodeVisitor):
     visit_List = visit_Set = visit_Tuple
 
     def visit_Dict(self, node: ast.Dict) -> KnownValue:
-        for part in node.keys:
-            if part is not None:
-                self.visit(part)
+        for part in filter(None, node.keys):
+            self.visit(part)
         parts = zip(node.keys, map(self.visit, node.values), strict=True)
         return holder([element(value) if key is None else value for key, value in parts])
 
@@ -302,9 +301,8 @@ class Expressions(ast.NodeVisitor):
         return element(value)
 
     def visit_Slice(self, node: ast.Slice) -> KnownValue:
-        for part in (node.lower, node.upper, node.step):
-            if part is not None:
-                self.visit(part)
+        for part in filter(None, (node.lower, node.upper, node.step)):
+            self.visit(part)
         return SLICE
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
@@ -412,8 +410,10 @@ class Expressions(ast.NodeVisitor):
         given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
-        if function.known is getattr and isinstance(places[1].known, str):
-            return self.attribute(places[0], places[1].known)
+        if function.known is getattr:
+            named = [self.attribute(places[0], name) for name in names_read(*places[:2])]
+            known = isinstance(places[1].known, str)
+            return named[0] if known else least_upper_bound([*named, *places[2:]])
         before = self.walk.keeps
         try:
             result = self.made_once(node, self.walk.call(function, given))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from .values import (
     OUTSIDE,
     PLAIN,
     UNKNOWN_VALUE,
+    Impure,
+    Instance,
     KnownValue,
     OneOf,
     RowOf,
@@ -21,6 +24,7 @@ from .values import (
     element,
     forgotten,
     least_upper_bound,
+    library,
 )
 
 
@@ -65,3 +69,15 @@ def part_of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
         parts = [thing[key] for thing in known if key in thing]
         return _any_of(parts) if parts else inside
     return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
+
+
+def names_read(base: KnownValue, name: KnownValue) -> list[str]:
+    """Return which attributes `getattr` may read: the one that is named, or all."""
+    if isinstance(name.known, str):
+        return [name.known]
+    thing = base.known
+    cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    if isinstance(thing, Unknown | OneOf | type | ModuleType) or library(cls) is not None:
+        raise Impure("calls getattr() by a name that is only known when it runs", "write it")
+    held = thing.attributes if isinstance(thing, Instance) else getattr(thing, "__dict__", {})
+    return sorted(name for name in {*held, *dir(cls)} if not name.startswith("__"))
