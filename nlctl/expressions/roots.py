@@ -3,8 +3,8 @@
 A traced function finds these instead of `scipy.optimize`'s.  Where SciPy raises an error, or
 needs more passes than are written out, the result is NaN.
 
-Source: `scipy/optimize/Zeros/brentq.c`, `brenth.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`; of `fsolve`
-J. J. More, B. S. Garbow and K. E. Hillstrom, User Guide for MINPACK-1 (1980), routine HYBRD.
+Source: `scipy/optimize/Zeros/brentq.c`, `brenth.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`.
+Of `fsolve`: J. J. More, B. S. Garbow and K. E. Hillstrom, User Guide for MINPACK-1 (1980), HYBRD.
 """
 
 from __future__ import annotations

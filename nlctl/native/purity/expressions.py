@@ -37,13 +37,14 @@ from .values import (
     RowOf,
     Unknown,
     captured,
-    choice_among,
     element,
     forgotten,
     handed_out_again,
     holder,
     least_upper_bound,
     library,
+    one_among,
+    opened,
     row,
 )
 from .walk import Walk
@@ -187,11 +188,11 @@ class Expressions(ast.NodeVisitor):
     def lists_may_hold_others(self) -> None:
         """Note that lists of the call, and of objects that it made, hold what it has not made."""
         names = self.frame.names
-        names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
+        names.update({k: opened(v) for k, v in names.items() if v.holds})
         for thing in self.walk.objects:
             for name, value in list(thing.attributes.items()):
                 if value.holds and value.inside and not isinstance(value.known, Instance):
-                    thing.learn(name, replace(value, inside=False))
+                    thing.learn(name, opened(value))
 
     # expressions
 
@@ -329,7 +330,7 @@ class Expressions(ast.NodeVisitor):
             return self.walk.function(getter, Given((base, *values[:1])))
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
-            return replace(element(base), known=choice_among(parts))
+            return one_among(element(base), parts)
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
@@ -411,9 +412,8 @@ class Expressions(ast.NodeVisitor):
         if function.known is super and not places:
             return self.parent_class()
         if function.known is getattr:
-            named = [self.attribute(places[0], name) for name in names_read(*places[:2])]
-            known = isinstance(places[1].known, str)
-            return named[0] if known else least_upper_bound([*named, *places[2:]])
+            names, others = names_read(*places)
+            return least_upper_bound([*(self.attribute(places[0], n) for n in names), *others])
         before = self.walk.keeps
         try:
             result = self.made_once(node, self.walk.call(function, given))

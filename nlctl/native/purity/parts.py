@@ -12,7 +12,6 @@ import numpy as np
 from .values import (
     OUTSIDE,
     PLAIN,
-    UNKNOWN_VALUE,
     Impure,
     Instance,
     KnownValue,
@@ -25,6 +24,7 @@ from .values import (
     forgotten,
     least_upper_bound,
     library,
+    one_among,
 )
 
 
@@ -38,7 +38,7 @@ def part_at(value: KnownValue, i: int, count: int) -> KnownValue:
     if all(isinstance(row, list | tuple) and len(row) == count for row in rows):
         column = [row[i] for row in rows]
         if all(isinstance(part, (*PLAIN, np.ndarray)) for part in column):
-            return replace(element(value), known=UNKNOWN_VALUE)
+            return one_among(element(value), column)
         return _any_of(column)
     return element(value)
 
@@ -71,13 +71,15 @@ def part_of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
     return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
 
 
-def names_read(base: KnownValue, name: KnownValue) -> list[str]:
-    """Return which attributes `getattr` may read: the one that is named, or all."""
+def names_read(
+    base: KnownValue, name: KnownValue, *others: KnownValue
+) -> tuple[list[str], tuple[KnownValue, ...]]:
+    """Return which attributes `getattr` may read: the one that is named, or all or a default."""
     if isinstance(name.known, str):
-        return [name.known]
+        return [name.known], ()
     thing = base.known
     cls = thing.cls if isinstance(thing, Instance) else type(thing)
     if isinstance(thing, Unknown | OneOf | type | ModuleType) or library(cls) is not None:
         raise Impure("calls getattr() by a name that is only known when it runs", "write it")
     held = thing.attributes if isinstance(thing, Instance) else getattr(thing, "__dict__", {})
-    return sorted(name for name in {*held, *dir(cls)} if not name.startswith("__"))
+    return sorted(n for n in {*held, *dir(cls)} if not n.startswith("__")), others

@@ -1,4 +1,4 @@
-"""Contexts of one's own and attributes by computed names: what they change or swallow is refused."""
+"""Contexts of one's own and attributes by computed names: what they change is refused."""
 
 import control as ct
 import numpy as np
