@@ -260,7 +260,10 @@ def one_among(value: KnownValue, parts: Iterable[Any]) -> KnownValue:
 def choice_among(parts: Iterable[Any]) -> Any:
     """Return the choice between the parts of a list that was there before the call."""
     values = [captured(part) for part in parts]
-    if all(isinstance(v.known, (*PLAIN, np.ndarray)) for v in values) or len(values) > _CHOICES:
+    is_long = len(values) > _CHOICES
+    if is_long and any(is_somebodys(v.known) for v in values):
+        raise Impure(f"chooses among more than {_CHOICES} objects", "keep their numbers in arrays")
+    if is_long or all(isinstance(v.known, (*PLAIN, np.ndarray)) for v in values):
         return UNKNOWN_VALUE
     return OneOf(tuple(values))
 

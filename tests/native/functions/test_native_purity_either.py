@@ -30,6 +30,13 @@ class Kept:
         self.log.append(self.k)
         return len(self.log)
 
+    @property
+    def counted(self):
+        return self.mean()
+
+    def __add__(self, other):
+        return self.mean() + other
+
     def scaled(self, v):
         return self.k * v
 
@@ -66,6 +73,8 @@ CHANGING = {
     "filtered": lambda x: sum(o.mean() for o in filter(lambda o: o.k > 1, [A, B])) * x,
     "appended to arrays": lambda x: appended(x).count() * x,
     "put among arrays": lambda x: put_in(x).count() * x,
+    "a property of the next one": lambda x: next(iter(MANY)).counted * x,
+    "a sum with one of many": lambda x: (operator.itemgetter(3)(MANY) + 1.0) * x,
     "folded": lambda x: functools.reduce(lambda a, b: b, [A, B]).mean() * x,
 }
 
