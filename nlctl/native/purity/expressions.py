@@ -43,8 +43,8 @@ from .values import (
     holder,
     least_upper_bound,
     library,
+    maybe_shared,
     one_among,
-    opened,
     row,
 )
 from .walk import Walk
@@ -188,11 +188,11 @@ class Expressions(ast.NodeVisitor):
     def lists_may_hold_others(self) -> None:
         """Note that lists of the call, and of objects that it made, hold what it has not made."""
         names = self.frame.names
-        names.update({k: opened(v) for k, v in names.items() if v.holds})
+        names.update({k: maybe_shared(v) for k, v in names.items() if v.holds})
         for thing in self.walk.objects:
             for name, value in list(thing.attributes.items()):
                 if value.holds and value.inside and not isinstance(value.known, Instance):
-                    thing.learn(name, opened(value))
+                    thing.learn(name, maybe_shared(value))
 
     # expressions
 

@@ -104,7 +104,7 @@ def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
     return KnownValue(True, True, known=Pure()) if of_library else FRESH
 
 
-def reduced(walk: Walk, places: Sequence[KnownValue]) -> KnownValue:
+def result_of_reduce(walk: Walk, places: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of what `functools.reduce` makes, which it hands on each time."""
     part, count = element(places[1]), 1
     if isinstance(places[1].known, ListOf | list | tuple):

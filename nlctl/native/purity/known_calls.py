@@ -23,7 +23,7 @@ from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
-from .handed_on import handed_on, reduced, rows_of_functions, views_of
+from .handed_on import handed_on, result_of_reduce, rows_of_functions, views_of
 from .values import (
     FRESH,
     OUTSIDE,
@@ -116,7 +116,7 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         known = Cached(places[0]) if is_function else Bound(captured(functools.cache), Given())
         return KnownValue(True, True, known=known)
     if thing is functools.reduce and not isinstance(places[0].known, Unknown):
-        return reduced(walk, places)
+        return result_of_reduce(walk, places)
     if isinstance(thing, enum.EnumType) and len(places) == 1:
         missing = inspect.getattr_static(thing, "_missing_")
         if missing not in [vars(cls)["_missing_"] for cls in (enum.Enum, enum.Flag)]:
@@ -249,8 +249,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         _written(given.places[0], "an array with .at()")
         return FRESH
     if name in named.READING:
-        if isinstance(thing, Unknown) and base.holds and not (base.own or base.inside):
-            raise Impure(f"calls {name}() of what may be an object", "name the object")
+        _check_no_object(base, name)
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
         if name == "astype" and given.names.get("copy", captured(True)).known is not True:
@@ -297,6 +296,12 @@ def _read(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValu
         return KnownValue(True, base.inside, True, known=parts)
     kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
     return KnownValue(True, base.inside, True) if kept else FRESH
+
+
+def _check_no_object(base: KnownValue, name: str) -> None:
+    """Check that a method is not one of an object of which nothing is known."""
+    if isinstance(base.known, Unknown) and base.holds and not (base.own or base.inside):
+        raise Impure(f"calls {name}() of what may be an object", "name the object")
 
 
 def _written(base: KnownValue, what: str) -> None:

@@ -297,7 +297,7 @@ def is_somebodys(thing: object) -> bool:
     return not isinstance(thing, plain) and library(type(thing)) is None
 
 
-def opened(value: KnownValue) -> KnownValue:
+def maybe_shared(value: KnownValue) -> KnownValue:
     """Return what is known of a list that may have been given what the call has not made."""
     known = UNKNOWN_VALUE if value.known is ARRAYS else value.known
     return replace(value, inside=False, known=known)
