@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import EnumType, Flag
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from .graph import SMALL, Expr, Graph, Untraceable
+from .graph import SMALL, Expr, Graph, Untraceable, catchable
 
 _MOST = 2048  # elements of an array that are kept individually
 _TABLED = 256  # elements of a constant matrix beyond which each row is a table
+
+
+def asked_by_enum() -> bool:
+    """Whether what is asked of an array is asked to find a member of an enumeration."""
+    frame = sys._getframe(2)
+    cls = frame.f_locals.get("cls") if frame.f_globals.get("__name__") == "enum" else None
+    return isinstance(cls, EnumType) and not issubclass(cls, Flag)  # these are made of others
 
 
 class Special:
@@ -178,7 +187,12 @@ class Tracer:
     def _text(self, *_: object) -> str:
         raise Untraceable("a text of what is only known when it runs")
 
-    __str__ = __repr__ = __format__ = _text
+    def __repr__(self) -> str:
+        if asked_by_enum():  # for the text of its error: it is not a member's value
+            raise catchable(ValueError)
+        return self._text()
+
+    __str__ = __format__ = _text
 
     def __len__(self) -> int:
         if not self.shape:

@@ -16,7 +16,7 @@ _READS = ("leaf", "call", "solve")
 def constant_value(value: Tracer) -> Any:
     """Return an array of constants as numbers, any other as it is."""
     cells = list(value.values.flat)
-    if any(e.op in _READS for e in needed(cells)):
+    if any(e.varies for e in cells) or any(e.op in _READS for e in needed(cells)):
         return value
     numbers = evaluate_expressions(cells, {})
     kinds = {e.kind for e in cells}

@@ -18,9 +18,14 @@ def evaluate_expressions(
     """Return the values of expressions."""
     values: dict[Expr, np.ndarray] = {}
     results = list(results)
+    nodes, kept = needed(results), set(results)
+    last = {arg: node for node in nodes for arg in node.args}  # where it is read last
     with np.errstate(all="ignore"):  # infinity and NaN travel, as they do in machine code
-        for node in needed(results):
+        for node in nodes:
             values[node] = value_of(node, [values[arg] for arg in node.args], arrays, searches)
+            for arg in node.args:
+                if last[arg] is node and arg not in kept:
+                    values.pop(arg, None)
     return [values[expr] for expr in results]
 
 

@@ -22,6 +22,7 @@ from .operators import elementwise
 INSTEAD_NAME = "{}@traced"  # of what stands for statements: no name that anybody has
 QUESTIONS = ("truth", "none")  # what is asked by functions instead of ``is``
 _BINDING = (ast.NamedExpr, ast.Yield, ast.YieldFrom, ast.Await)
+_MOST_PARTS = 400  # of a value that is written out of those before
 _Values = dict[str, tuple[ast.expr, ast.expr]]  # of what is assigned: where, and what
 
 
@@ -146,10 +147,50 @@ def _assigned(body: Sequence[ast.stmt]) -> _Values | None:
                 if isinstance(n, ast.Name)}  # fmt: skip
         written = {n.id for t, _ in values.values() for n in ast.walk(t) if isinstance(n, ast.Name)}
         elements = any(isinstance(t, ast.Subscript) for t, _ in values.values())
-        if more is None or read & written or elements:
+        if more is not None and read & written:
+            more = _of_values_before(more, values)
+        if more is None or elements:
             return None
         values |= more
     return values
+
+
+def _of_values_before(more: _Values, values: _Values) -> _Values | None:
+    """Return what is assigned later in a branch, of what names have had before; None if unsure."""
+    scopes = ast.Lambda | ast.ListComp | ast.GeneratorExp | ast.SetComp | ast.DictComp
+    later_on: _Values = {}
+    for name, (target, value) in more.items():
+        inlined = _Inlined(values)
+        whole = inlined.visit(copy.deepcopy(value))
+        parts = list(ast.walk(whole))
+        scoped = any(isinstance(n, scopes) for n in ast.walk(value))
+        if not inlined.is_sure or scoped or len(parts) > _MOST_PARTS:
+            return None
+        later_on[name] = target, whole
+    return later_on
+
+
+class _Inlined(ast.NodeTransformer):
+    """Writes for names the values that they have, where these may be computed again."""
+
+    def __init__(self, values: _Values) -> None:
+        self.values, self.is_sure = values, True
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id not in self.values:
+            return node
+        value = copy.deepcopy(self.values[node.id][1])
+        calls = [n.func for n in ast.walk(value) if isinstance(n, ast.Call)]
+        self.is_sure &= all(map(_only_computes, calls))
+        return value
+
+
+def _only_computes(function: ast.expr) -> bool:
+    """Whether calling a function again changes nothing, by its name."""
+    if isinstance(function, ast.Attribute):
+        return isinstance(function.value, ast.Name) and function.value.id in ("np", "math")
+    names = ("abs", "min", "max", "float", "int", *map(INSTEAD_NAME.format, ("number", "item")))
+    return isinstance(function, ast.Name) and function.id in names
 
 
 def _one(statement: ast.stmt) -> _Values | None:

@@ -19,6 +19,7 @@ from .arrays import (
     Special,
     Tracer,
     as_array,
+    asked_by_enum,
     is_complex,
     mapped,
     python_number,
@@ -269,6 +270,8 @@ def _hash(self: Tracer) -> int:
     """Return the hash of a constant, or of the value of an integer that is followed."""
     if not self.shape and self.only.op == "const":
         return hash(self.only.data)
+    if asked_by_enum():
+        raise TypeError("compared with each member")
     return hash(integer_followed(self))
 
 

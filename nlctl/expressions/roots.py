@@ -3,8 +3,8 @@
 A traced function finds these instead of `scipy.optimize`'s.  Where SciPy raises an error, or
 needs more passes than are written out, the result is NaN.
 
-Source: `scipy/optimize/Zeros/brentq.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`; of `fsolve`
-J. J. More, B. S. Garbow and K. E. Hillstrom, User Guide for MINPACK-1 (1980), routine HYBRD.
+Source: `scipy/optimize/Zeros/brentq.c`, `brenth.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`.
+Of `fsolve`: J. J. More, B. S. Garbow and K. E. Hillstrom, User Guide for MINPACK-1 (1980), HYBRD.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ def roots() -> dict[Any, Callable[..., Any]]:
     return {
         optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton,
         optimize.root_scalar: root_scalar, optimize.fsolve: fsolve, optimize.root: root_by_powell,
+        optimize.brenth: brenth, optimize.fixed_point: fixed_point,
     }  # fmt: skip
 
 
@@ -95,9 +96,10 @@ def root_scalar(
         method = "brentq" if bracket is not None else by_tangents
     named = {"rtol": rtol, "maxiter": maxiter}
     named = {name: value for name, value in named.items() if value is not None}
-    if method in ("brentq", "bisect") and bracket is not None:
+    bracketed = {"brentq": brentq, "brenth": brenth, "bisect": bisect}
+    if method in bracketed and bracket is not None:
         named |= {} if xtol is None else {"xtol": xtol}
-        search = brentq if method == "brentq" else bisect
+        search = bracketed[method]
         return _found(search(f, bracket[0], bracket[1], args, **named), method)
     named |= {} if xtol is None else {"tol": xtol}
     if method == "newton" and callable(fprime):
@@ -126,11 +128,46 @@ def brentq(
 ):  # fmt: skip
     """Return a root between two places with values of opposite signs, by Brent's method."""
     args = args if isinstance(args, tuple) else (args,)
-    root = with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter), args)
+    root = with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter, _bent), args)
     return _reported(root, "brentq", full_output, disp)
 
 
-def _by_brent(f, a, b, args, xtol, rtol, maxiter):
+def brenth(
+    f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100, full_output=False,
+    disp=True,
+):  # fmt: skip
+    """Return a root between two places, by Brent's method with hyperbolas."""
+    args = args if isinstance(args, tuple) else (args,)
+    root = with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter, _hyperbola), args)
+    return _reported(root, "brenth", full_output, disp)
+
+
+def _bent(fcur, fpre, fblk, dpre, dblk):
+    return -fcur * (fblk * dblk - fpre * dpre) / (dblk * dpre * (fblk - fpre))
+
+
+def _hyperbola(fcur, fpre, fblk, dpre, dblk):
+    return -fcur * (fblk - fpre) / (fblk * dpre - fpre * dblk)
+
+
+def fixed_point(func, x0, args=(), xtol=1e-8, maxiter=500, method="del2"):
+    """Return where a function of one number is what it is given, by Steffensen's method."""
+    if method != "del2" or np.shape(x0):
+        return refused("scipy.optimize.fixed_point of several numbers, or by another method")
+    p0 = np.multiply(1.0, x0)
+    for _ in range(maxiter):
+        p1 = func(p0, *args)
+        p2 = func(p1, *args)
+        bend = p2 - 2.0 * p1 + p0
+        p = np.where(bend != 0, p0 - np.square(p1 - p0) / bend, p2)
+        change = np.where(p0 != 0, (p - p0) / p0, p)
+        if abs(change) < xtol:
+            return p
+        p0 = p
+    raise RuntimeError("Failed to converge")
+
+
+def _by_brent(f, a, b, args, xtol, rtol, maxiter, bent):
     xpre, xcur = np.multiply(1.0, a), np.multiply(1.0, b)  # in C nothing raises errors
     fpre, fcur = f(xpre, *args), f(xcur, *args)
     if fpre * fcur > 0:
@@ -152,8 +189,7 @@ def _by_brent(f, a, b, args, xtol, rtol, maxiter):
             return xcur
         line = -fcur * (xcur - xpre) / (fcur - fpre)
         dpre, dblk = (fpre - fcur) / (xpre - xcur), (fblk - fcur) / (xblk - xcur)
-        bent = -fcur * (fblk * dblk - fpre * dpre) / (dblk * dpre * (fblk - fpre))
-        stry = np.where(xpre == xblk, line, bent)
+        stry = np.where(xpre == xblk, line, bent(fcur, fpre, fblk, dpre, dblk))
         short = 2 * abs(stry) < np.minimum(abs(spre), 3 * abs(sbis) - delta)
         taken = (abs(spre) > delta) & (abs(fcur) < abs(fpre)) & short
         spre, scur = np.where(taken, scur, sbis), np.where(taken, stry, sbis)

@@ -200,6 +200,8 @@ class Stage:
         if isinstance(value, CPUDispatcher | FunctionType):
             if value in (dataclasses.dataclass, collections.namedtuple, typing.NamedTuple):
                 return value  # they look at types, defaults and names alone
+            if value is dataclasses.fields:
+                return lambda thing: value(staged.settled(thing))
             if value in (dataclasses.replace, dataclasses.asdict, dataclasses.astuple):
                 return functools.partial(staged.of_fields, self, value)
             if staged.is_of_a_library(value):

@@ -258,7 +258,7 @@ for _name in ("add", "sub", "mul", "truediv", "matmul", "pow", "mod", "floordiv"
         _full = f"__{_kind}{_name}__"
         setattr(StagedObject, _full, _forwarded(_full))
 for _name in ("neg", "pos", "abs", "invert", "eq", "ne", "lt", "le", "gt", "ge", "iter", "len",
-              "getitem", "contains", "bool"):  # fmt: skip
+              "getitem", "contains", "bool", "enter", "exit"):  # fmt: skip
     setattr(StagedObject, f"__{_name}__", _forwarded(f"__{_name}__"))
 
 

@@ -49,7 +49,7 @@ def check_slopes(graph: Graph, results: Sequence[Expr], given: Iterable[Expr]) -
     copied, asked = [copies[e] for e in results], [copies[e] for e in asking]
     seeds = tangents(alone, copied, lambda leaf: alone.leaf("way", leaf.data[1], leaf.size))
     slopes = _values([slope or alone.const(0.0) for slope in seeds], z, way)
-    moved = np.array([_values([*copied, *asked], z + h * way, way) for h in (*_STEPS, *-_STEPS)])
+    moved = _moved([*copied, *asked], z, way)
     values, answers = np.split(moved, [len(slopes)], axis=1)
     points = np.flatnonzero(_have_another(slopes, *np.split(values, 2)))
     answers = np.sign(answers[:, :, points])
@@ -109,6 +109,13 @@ def _points(
         z.append(value)
         sizes.append(size)
     return np.concatenate(z), np.concatenate(sizes)
+
+
+def _moved(exprs: Sequence[Expr], z: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Return what expressions are behind all steps, of shape (steps, rows, points)."""
+    steps = [*_STEPS, *-_STEPS]
+    there = np.concatenate([z + h * way for h in steps], axis=1)
+    return np.stack(np.split(_values(exprs, there, there), len(steps), axis=1))
 
 
 def _values(exprs: Sequence[Expr], z: np.ndarray, way: np.ndarray) -> np.ndarray:

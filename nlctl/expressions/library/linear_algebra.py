@@ -268,20 +268,29 @@ def det(graph: Graph, a: object) -> Any:
 @of(np.linalg.slogdet)
 def slogdet(graph: Graph, a: object) -> Any:
     """Return the sign of a determinant and the logarithm of its size."""
-    value = det(graph, a)
-    size = elementwise(graph, "log", elementwise(graph, "absolute", value))
-    return type(np.linalg.slogdet(np.eye(1)))(elementwise(graph, "sign", value), size)
+    rows, np_ = _square(graph, a), Facade(graph)
+    if len(rows) > _SMALL:
+        raise Untraceable("slogdet of a large matrix")
+    _, pivots = eliminated(np_, [list(row) for row in rows], exchanges := [])
+    sign = functools.reduce(lambda a, b: a * b, map(np_.sign, pivots))
+    for exchanged in exchanges:
+        sign = np_.where(exchanged, -sign, sign)
+    size = functools.reduce(lambda a, b: a + b, [np_.log(np_.abs(v)) for v in pivots])
+    more, singular = _skipped(graph, rows), _any_is_zero(np_, pivots)
+    parts = np_.where(singular, 0.0, sign + more), np_.where(singular, -np.inf, size + more)
+    return type(np.linalg.slogdet(np.eye(1)))(*parts)
 
 
 def _determinant(graph: Graph, rows: _Rows) -> Any:
     np_ = Facade(graph)
     _, pivots = eliminated(np_, [list(row) for row in rows], exchanges := [])
-    product: Any = 1.0
-    for pivot in pivots:
-        product = product * pivot
+    products = list(itertools.accumulate(pivots, lambda a, b: a * b))
+    singular, product = _any_is_zero(np_, pivots), products[-1]
+    for part in products[:-1] if len(pivots) > 2 else ():  # NumPy adds logarithms instead
+        inside = np_.logical_and(np_.abs(part) < np.inf, part != 0.0)
+        graph.guards.append(np_.logical_or(inside, singular).only)
     for exchanged in exchanges:
         product = np_.where(exchanged, -product, product)
-    singular = _any_is_zero(np_, pivots)
     return np_.where(singular, 0.0, product + _skipped(graph, rows))
 
 
@@ -322,9 +331,9 @@ def lstsq(graph: Graph, a: object, b: object, rcond: Any = None) -> tuple[Any, .
     if not isinstance(matrix, np.ndarray):
         rcond = np.finfo(float).eps * max(matrix.shape) if rcond is None else rcond
         inverse = WRITTEN[np.linalg.pinv](graph, matrix, rcond)
-        return product(inverse, traced(graph, b)), *[NotComputed(_REST)] * 3
+        return _all_or_none(graph, inverse, traced(graph, b)), *[NotComputed(_REST)] * 3
     b = traced(graph, b)
-    solution = product(traced(graph, np.linalg.pinv(matrix)), b)
+    solution = _all_or_none(graph, traced(graph, np.linalg.pinv(matrix)), b)
     singular = np.linalg.svd(matrix, compute_uv=False)
     rank = int(np.linalg.matrix_rank(matrix))
     rest = traced(graph, np.zeros(0))
@@ -333,6 +342,12 @@ def lstsq(graph: Graph, a: object, b: object, rcond: Any = None) -> tuple[Any, .
         rest = total(elementwise(graph, "mul", apart, apart), 0)
         rest = rest if rest.shape else rest.reshape(1)
     return solution, rest, rank, traced(graph, singular)
+
+
+def _all_or_none(graph: Graph, inverse: Tracer, b: Tracer) -> Tracer:
+    """Return the product with an inverse; it is NaN where LAPACK is given what is not finite."""
+    spread = total(elementwise(graph, "mul", b, 0.0), 0)
+    return product(inverse, elementwise(graph, "sub", b, spread))
 
 
 class _Factors(NotComputed):

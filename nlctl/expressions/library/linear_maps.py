@@ -19,15 +19,16 @@ _MOST = 64  # elements of the data
 
 @functools.cache
 def enter_linear_maps() -> None:
-    """Enter them; the data are the first argument, the third one of a filter."""
+    """Enter them; the data are the first argument, the second or third one of a filter."""
     from scipy import fft, integrate, ndimage, signal
 
     for function in (integrate.simpson, signal.savgol_filter, signal.detrend,
                      ndimage.gaussian_filter1d, ndimage.uniform_filter1d, fft.dct, fft.idct,
                      fft.dst, fft.idst):  # fmt: skip
         enter([function], _by_matrix(function, 0))
-    for function in (signal.lfilter, signal.filtfilt, ndimage.correlate1d, ndimage.convolve1d):
-        place = 2 if function in (signal.lfilter, signal.filtfilt) else 0
+    places = {signal.lfilter: 2, signal.filtfilt: 2, signal.sosfilt: 1, signal.sosfiltfilt: 1,
+              ndimage.correlate1d: 0, ndimage.convolve1d: 0}  # fmt: skip
+    for function, place in places.items():
         enter([function], _by_matrix(function, place))
 
 
@@ -52,6 +53,8 @@ def _by_matrix(function: Callable[..., Any], place: int) -> Callable[..., Any]:
         if np.any(of(np.zeros(data.size))):
             raise Untraceable(f"{function.__name__}, which adds something here")
         columns = np.array([of(unit) for unit in np.eye(data.size)])
+        spread = functools.reduce(lambda a, b: a + b, [data[k] * 0.0 for k in range(data.size)])
+        data = data - spread  # what is not finite is in all results
         if not columns[0].shape:
             return _weighed(data, columns)
         return traced(graph, [_weighed(data, row) for row in columns.T])

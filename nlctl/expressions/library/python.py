@@ -8,6 +8,7 @@ import functools
 import heapq
 import math
 import sys
+import warnings
 from collections.abc import Callable
 from types import BuiltinFunctionType, FunctionType, MethodType, NoneType
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
 from ..decimals import to_decimals
-from ..graph import Graph, MessageWritten, Namespace, Untraceable
+from ..graph import Expr, Graph, MessageWritten, Namespace, Untraceable, catchable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from ..promoted import is_numpys
@@ -107,9 +108,8 @@ class Builtins:
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):
             return float(value)
-        if value.shape:
-            raise Untraceable("the float of an array")
-        return python_number(self.graph, self.graph.number(value.only))
+        only = _single(value)
+        return python_number(self.graph, self.graph.number(only))
 
     def _complex(self, *parts: Any) -> Any:
         if not any(map(is_traced, parts)):
@@ -119,9 +119,8 @@ class Builtins:
     def _int(self, value: Any = 0, *rest: Any) -> Any:
         if not isinstance(value, Tracer):
             return int(value, *rest)
-        if value.shape:
-            raise Untraceable("the integer of an array")
-        only = value.only
+        only = _single(value)
+        value = scalar(self.graph, only) if value.shape else value
         if only.op == "const":
             return int(only.data)
         if only.kind == "i":
@@ -232,6 +231,18 @@ class Builtins:
         if options or arrays:
             raise Untraceable(f"{name} of arrays, or with {', '.join(options)}")
         return extreme(name, values, keys, self.graph)
+
+
+def _single(value: Tracer) -> Expr:
+    """Return the number that an array is for Python, where NumPy's version takes it for one."""
+    if value.shape:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                float(np.zeros(value.shape))
+        except TypeError:
+            raise catchable(TypeError) from None
+    return value.elements().flat[0] if value.shape else value.only
 
 
 def _holds_traced(value: object) -> bool:

@@ -17,7 +17,7 @@ from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
-from .parts import part_at, part_of_one, part_of_row
+from .parts import names_read, part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
     OUTSIDE,
@@ -37,13 +37,14 @@ from .values import (
     RowOf,
     Unknown,
     captured,
-    choice_among,
     element,
     forgotten,
     handed_out_again,
     holder,
     least_upper_bound,
     library,
+    maybe_shared,
+    one_among,
     row,
 )
 from .walk import Walk
@@ -187,11 +188,11 @@ class Expressions(ast.NodeVisitor):
     def lists_may_hold_others(self) -> None:
         """Note that lists of the call, and of objects that it made, hold what it has not made."""
         names = self.frame.names
-        names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
+        names.update({k: maybe_shared(v) for k, v in names.items() if v.holds})
         for thing in self.walk.objects:
             for name, value in list(thing.attributes.items()):
                 if value.holds and value.inside and not isinstance(value.known, Instance):
-                    thing.learn(name, replace(value, inside=False))
+                    thing.learn(name, maybe_shared(value))
 
     # expressions
 
@@ -290,9 +291,8 @@ class Expressions(ast.NodeVisitor):
     visit_List = visit_Set = visit_Tuple
 
     def visit_Dict(self, node: ast.Dict) -> KnownValue:
-        for part in node.keys:
-            if part is not None:
-                self.visit(part)
+        for part in filter(None, node.keys):
+            self.visit(part)
         parts = zip(node.keys, map(self.visit, node.values), strict=True)
         return holder([element(value) if key is None else value for key, value in parts])
 
@@ -302,9 +302,8 @@ class Expressions(ast.NodeVisitor):
         return element(value)
 
     def visit_Slice(self, node: ast.Slice) -> KnownValue:
-        for part in (node.lower, node.upper, node.step):
-            if part is not None:
-                self.visit(part)
+        for part in filter(None, (node.lower, node.upper, node.step)):
+            self.visit(part)
         return SLICE
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
@@ -331,7 +330,7 @@ class Expressions(ast.NodeVisitor):
             return self.walk.function(getter, Given((base, *values[:1])))
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
-            return replace(element(base), known=choice_among(parts))
+            return one_among(element(base), parts)
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
@@ -412,8 +411,9 @@ class Expressions(ast.NodeVisitor):
         given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
-        if function.known is getattr and isinstance(places[1].known, str):
-            return self.attribute(places[0], places[1].known)
+        if function.known is getattr:
+            names, others = names_read(*places)
+            return least_upper_bound([*(self.attribute(places[0], n) for n in names), *others])
         before = self.walk.keeps
         try:
             result = self.made_once(node, self.walk.call(function, given))

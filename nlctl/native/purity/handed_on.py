@@ -10,10 +10,12 @@ from typing import Any
 
 from .values import (
     FRESH,
+    OUTSIDE,
     UNKNOWN_VALUE,
     VECTOR,
     Bound,
     Cached,
+    Given,
     Instance,
     KnownValue,
     ListOf,
@@ -23,8 +25,11 @@ from .values import (
     RowOf,
     element,
     forgotten,
+    function_choice,
     holder,
+    least_upper_bound,
 )
+from .walk import Walk
 
 # of itertools, what yields rows of what it is given; where it is of one thing in each place
 _OF_ROWS = ("product", "permutations", "combinations", "combinations_with_replacement",
@@ -97,3 +102,17 @@ def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
         return KnownValue(True, False, True)  # a list or dict of what is in both
     of_library = any(isinstance(v.known, Pure) for v in values)
     return KnownValue(True, True, known=Pure()) if of_library else FRESH
+
+
+def result_of_reduce(walk: Walk, places: Sequence[KnownValue]) -> KnownValue:
+    """Return what is known of what `functools.reduce` makes, which it hands on each time."""
+    part, count = element(places[1]), 1
+    if isinstance(places[1].known, ListOf | list | tuple):
+        known = places[1].known
+        count = len(known.choices if isinstance(known, ListOf) else known)
+    results = [least_upper_bound([part, *places[2:]])]
+    if not isinstance(function_choice(results), OneOf):  # numbers: whatever comes out of it
+        return least_upper_bound([*results, walk.call(places[0], Given((OUTSIDE, part)))])
+    for _ in range(count):  # functions of functions: each is made of those before
+        results.append(walk.call(places[0], Given((results[-1], part))))
+    return least_upper_bound(results)

@@ -23,11 +23,12 @@ from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
-from .handed_on import handed_on, rows_of_functions, views_of
+from .handed_on import handed_on, result_of_reduce, rows_of_functions, views_of
 from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
+    VECTOR,
     Bound,
     Cached,
     Given,
@@ -115,7 +116,7 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         known = Cached(places[0]) if is_function else Bound(captured(functools.cache), Given())
         return KnownValue(True, True, known=known)
     if thing is functools.reduce and not isinstance(places[0].known, Unknown):
-        return _reduced(walk, places)
+        return result_of_reduce(walk, places)
     if isinstance(thing, enum.EnumType) and len(places) == 1:
         missing = inspect.getattr_static(thing, "_missing_")
         if missing not in [vars(cls)["_missing_"] for cls in (enum.Enum, enum.Flag)]:
@@ -133,20 +134,6 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
     return OUTSIDE if any(thing is reader for reader in reading) else None
-
-
-def _reduced(walk: Walk, places: Sequence[KnownValue]) -> KnownValue:
-    """Return what is known of what `functools.reduce` makes, which it hands on each time."""
-    part, count = element(places[1]), 1
-    if isinstance(places[1].known, ListOf | list | tuple):
-        known = places[1].known
-        count = len(known.choices if isinstance(known, ListOf) else known)
-    results = [least_upper_bound([part, *places[2:]])]
-    if not isinstance(function_choice(results), OneOf):  # numbers: whatever comes out of it
-        return least_upper_bound([*results, walk.call(places[0], Given((OUTSIDE, part)))])
-    for _ in range(count):  # functions of functions: each is made of those before
-        results.append(walk.call(places[0], Given((results[-1], part))))
-    return least_upper_bound(results)
 
 
 def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
@@ -262,6 +249,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         _written(given.places[0], "an array with .at()")
         return FRESH
     if name in named.READING:
+        _check_no_object(base, name)
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
         if name == "astype" and given.names.get("copy", captured(True)).known is not True:
@@ -308,6 +296,12 @@ def _read(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValu
         return KnownValue(True, base.inside, True, known=parts)
     kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
     return KnownValue(True, base.inside, True) if kept else FRESH
+
+
+def _check_no_object(base: KnownValue, name: str) -> None:
+    """Check that a method is not one of an object of which nothing is known."""
+    if isinstance(base.known, Unknown) and base.holds and not (base.own or base.inside):
+        raise Impure(f"calls {name}() of what may be an object", "name the object")
 
 
 def _written(base: KnownValue, what: str) -> None:
@@ -442,7 +436,8 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
         raise Impure(f"calls {name}, which reads or writes files", _FILES)
     if name in _OTHERS and (module, name) != ("json", "loads"):  # which takes a text apart
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
-    _call_functions(walk, given.every)
+    arrays = module.startswith(("numpy", "scipy")) and all(map(_holds_numbers, given.every))
+    _call_functions(walk, given.every, VECTOR if arrays else OUTSIDE)
     for value in given.every:
         if not callable(value.known):
             check_object(value, f"hands {name}")
@@ -468,7 +463,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if name == "einsum" and len(given.places) == 2:
         return forgotten(given.places[1])
     if name in named.VIEWS or may_be_it or module.startswith("numpy.ma"):
-        return forgotten(given.places[0]) if given.places else FRESH
+        return replace(forgotten(given.places[0]), holds=False) if given.places else FRESH
     return FRESH
 
 
@@ -487,14 +482,19 @@ def _makes_objects(thing: object, module: str) -> bool:
     return module.startswith(("scipy.interpolate", "scipy.spatial", "scipy.sparse", "re"))
 
 
-def _call_functions(walk: Walk, values: Any) -> None:
+def _holds_numbers(value: KnownValue) -> bool:
+    """Whether nothing that a value holds may be somebody's object."""
+    return value.inside or not value.holds or callable(value.known)
+
+
+def _call_functions(walk: Walk, values: Any, part: KnownValue = OUTSIDE) -> None:
     """Walk functions that are handed on: they will be called with anything."""
     for value in values:
         thing = value.known
         if isinstance(thing, Unknown | type | Pure):
             continue
         if isinstance(thing, OneOf):  # some of them may be lists
-            _call_functions(walk, thing.choices)
+            _call_functions(walk, thing.choices, part)
         elif isinstance(thing, Local | Bound | Cached | Instance) or callable(thing):
             count = getattr(thing, "nin", 2 if library(thing) else 8)
-            walk.call(value, Given((OUTSIDE,) * count))
+            walk.call(value, Given((part,) * count))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from .values import (
     OUTSIDE,
     PLAIN,
-    UNKNOWN_VALUE,
+    Impure,
+    Instance,
     KnownValue,
     OneOf,
     RowOf,
@@ -21,6 +23,8 @@ from .values import (
     element,
     forgotten,
     least_upper_bound,
+    library,
+    one_among,
 )
 
 
@@ -34,7 +38,7 @@ def part_at(value: KnownValue, i: int, count: int) -> KnownValue:
     if all(isinstance(row, list | tuple) and len(row) == count for row in rows):
         column = [row[i] for row in rows]
         if all(isinstance(part, (*PLAIN, np.ndarray)) for part in column):
-            return replace(element(value), known=UNKNOWN_VALUE)
+            return one_among(element(value), column)
         return _any_of(column)
     return element(value)
 
@@ -65,3 +69,17 @@ def part_of_one(base: KnownValue, keys: Sequence[Any]) -> KnownValue:
         parts = [thing[key] for thing in known if key in thing]
         return _any_of(parts) if parts else inside
     return element(base) if all(isinstance(thing, list | tuple) for thing in known) else base
+
+
+def names_read(
+    base: KnownValue, name: KnownValue, *others: KnownValue
+) -> tuple[list[str], tuple[KnownValue, ...]]:
+    """Return which attributes `getattr` may read: the one that is named, or all or a default."""
+    if isinstance(name.known, str):
+        return [name.known], ()
+    thing = base.known
+    cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    if isinstance(thing, Unknown | OneOf | type | ModuleType) or library(cls) is not None:
+        raise Impure("calls getattr() by a name that is only known when it runs", "write it")
+    held = thing.attributes if isinstance(thing, Instance) else getattr(thing, "__dict__", {})
+    return sorted(n for n in {*held, *dir(cls)} if not n.startswith("__")), others

@@ -9,11 +9,12 @@ import importlib
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
-from ...expressions.source import Definition
+from ...expressions.source import Definition, Unreadable, definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import CONTAINERS, MEMORY
@@ -247,13 +248,13 @@ class CallWalker(Expressions):
         raise Impure("has try ... except*", "write an if for the case that fails")
 
     def visit_With(self, node: ast.With) -> None:
-        ends_early, body = False, node.body
+        ends_early, body, left = False, node.body, []
         for item in node.items:
             call = item.context_expr
             entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
             plain = entered in (np.errstate, contextlib.suppress, warnings.catch_warnings)
             if not plain or item.optional_vars is not None:
-                raise Impure("has a with statement", "do without it")
+                left.append(self.entered(item))
             ends_early |= entered is contextlib.suppress
             if entered is warnings.catch_warnings:  # it takes back what is said about them
                 self.walk.numba_differs += ["try"]
@@ -263,6 +264,20 @@ class CallWalker(Expressions):
             self.either([body, []])
         else:
             self.statements(body)
+        for value, leave in reversed(left):
+            self.walk.function(leave, Given((value, FRESH, FRESH, FRESH)))
+
+    def entered(self, item: ast.withitem) -> tuple[KnownValue, FunctionType]:
+        """Enter an object of somebody's class; return it with what is called at the end."""
+        value = self.visit(item.context_expr)
+        enter, leave = (made.operator_of(self.walk, value, f"__{w}__") for w in ("enter", "exit"))
+        if enter is None or leave is None or _swallows(leave):
+            raise Impure("has a with statement", "do without it")
+        self.walk.numba_differs += ["try"]  # numba has no such word
+        result = self.walk.function(enter, Given((value,)))
+        if item.optional_vars is not None:
+            self.bind(item.optional_vars, result)
+        return value, leave
 
     def _is_about_warnings(self, node: ast.stmt) -> bool:
         """Return whether a statement says which warnings are shown."""
@@ -307,6 +322,16 @@ class CallWalker(Expressions):
                 node, self.frame.function, decorators, bases, others
             )
         self.assign(node.name, captured(self.walk.classes[node]))
+
+
+def _swallows(leave: FunctionType) -> bool:
+    """Whether the end of a ``with`` may keep errors to itself: it returns something."""
+    try:
+        nodes = ast.walk(definition(leave))
+    except Unreadable:
+        return True
+    given = [n.value for n in nodes if isinstance(n, ast.Return | ast.Yield | ast.YieldFrom)]
+    return any(not isinstance(v, ast.Constant | None) or (v and v.value) for v in given)
 
 
 def _leaves(body: Sequence[ast.stmt]) -> bool:

@@ -19,6 +19,7 @@ class Unknown:
 
 
 UNKNOWN_VALUE = Unknown()
+ARRAYS = Unknown()  # what holds numbers and arrays alone
 _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
@@ -223,14 +224,15 @@ def row(values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of a tuple of these."""
     held = holder(values)
     is_mixed = isinstance(held.known, Unknown) and any(
-        isinstance(function_choice([v]), OneOf) for v in values
+        isinstance(function_choice([v]), OneOf) or not (v.own or v.holds) for v in values
     )
     return replace(held, known=RowOf(tuple(values))) if is_mixed else held
 
 
 def element(value: KnownValue) -> KnownValue:
     """Return what is known of an element, whichever it is."""
-    known, plain = value.known, KnownValue(value.inside, value.inside, value.holds)
+    known, holds = value.known, value.holds and value.known is not ARRAYS
+    plain = KnownValue(value.inside, value.inside, holds)
     if isinstance(known, ListOf):
         return least_upper_bound(known.choices)
     if isinstance(known, OneOf):
@@ -241,14 +243,27 @@ def element(value: KnownValue) -> KnownValue:
     if isinstance(known, Pure):
         return replace(plain, known=known)
     if isinstance(known, list | tuple | EnumType) and known:
-        return replace(plain, known=choice_among(known))
+        return one_among(plain, known)
+    if (library(type(known)) or "").startswith("pandas"):
+        return replace(plain, inside=True, holds=False)  # numbers, or a column of these
     return plain
+
+
+def one_among(value: KnownValue, parts: Iterable[Any]) -> KnownValue:
+    """Return what is known of one of the parts of a list that was there before the call."""
+    parts = list(parts)
+    if parts and all(isinstance(part, (*PLAIN, np.ndarray)) for part in parts):
+        return forgotten(least_upper_bound(map(captured, parts)))
+    return replace(value, known=choice_among(parts))
 
 
 def choice_among(parts: Iterable[Any]) -> Any:
     """Return the choice between the parts of a list that was there before the call."""
     values = [captured(part) for part in parts]
-    if all(isinstance(v.known, (*PLAIN, np.ndarray)) for v in values) or len(values) > _CHOICES:
+    is_long = len(values) > _CHOICES
+    if is_long and any(is_somebodys(v.known) for v in values):
+        raise Impure(f"chooses among more than {_CHOICES} objects", "keep their numbers in arrays")
+    if is_long or all(isinstance(v.known, (*PLAIN, np.ndarray)) for v in values):
         return UNKNOWN_VALUE
     return OneOf(tuple(values))
 
@@ -258,6 +273,8 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
     values = list(values)
     known = function_choice(values)
     known = ListOf(tuple(values)) if isinstance(known, OneOf) else known
+    if known is UNKNOWN_VALUE and not any(v.holds for v in values):
+        known = ARRAYS
     return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 
 
@@ -265,11 +282,25 @@ def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
     kinds = Local | Bound | Cached | OneOf | ListOf | RowOf | Instance | Pure
-    functions = all(isinstance(v.known, kinds) or callable(v.known) for v in values)
+    functions = all(
+        isinstance(v.known, kinds) or callable(v.known) or is_somebodys(v.known) for v in values
+    )
     if not values or not functions:
         return UNKNOWN_VALUE
     flat = [c for v in values for c in (v.known.choices if isinstance(v.known, OneOf) else (v,))]
     return OneOf(tuple(dict.fromkeys(flat))) if len(flat) <= _CHOICES else UNKNOWN_VALUE
+
+
+def is_somebodys(thing: object) -> bool:
+    """Whether a thing that was there before the call is an object of somebody's class."""
+    plain = (Unknown, *PLAIN, np.ndarray, list, tuple, dict, set, frozenset, range, ModuleType)
+    return not isinstance(thing, plain) and library(type(thing)) is None
+
+
+def maybe_shared(value: KnownValue) -> KnownValue:
+    """Return what is known of a list that may have been given what the call has not made."""
+    known = UNKNOWN_VALUE if value.known is ARRAYS else value.known
+    return replace(value, inside=False, known=known)
 
 
 def forgotten(value: KnownValue) -> KnownValue:
