@@ -73,9 +73,7 @@ def test_twisting_ends_near_the_time_of_its_last_switch(engine):
     twisting = own(lambda t, x, u, p: [x[1], -3 * np.sign(x[0]) - np.sign(x[1])], 2)
     limit = 1.5 / (1 - np.sqrt(0.5))
     with pytest.raises(nlctl.errors.ChatteringError) as ended:
-        nlctl.input_output_response(
-            twisting, [0, 30.0], 0, [1.0, 0.0], engine=engine, slide=False
-        )
+        nlctl.input_output_response(twisting, [0, 30.0], 0, [1.0, 0.0], engine=engine, slide=False)
     near = re.search(r"block 'own' \(sign\) accumulate near t = ([\d.]+) s", str(ended.value))
     assert near
     assert float(near[1]) == pytest.approx(limit, abs=2e-4)
