@@ -111,14 +111,13 @@ class _Around:
         located, s = self.read.conditions.located, group[0][1]
         every = [e for name in self.read.results for e, _ in self.read.pieces(name)]
         every += [e for part in self.read.fixed_points.values() for e in part]
-        function = located[group[0][0]].function
         changing = changing_at(self.graph, every, [located[k].function for k, _ in group])
         sides = [_sides(values, s) for values in self.values(changing)]
         if None in sides:
             return None
         sides = tuple(one for one in sides if one)
         rates = [e for name in ("dx", "y") for e, _ in self.read.pieces(name)]
-        both = of_both_sides(self.graph, rates, changing, sides, function)
+        both = of_both_sides(self.graph, rates, changing, sides)
         now, below, above = map(self.values, (rates, *both))
         if np.array_equal(below, above) or not np.array_equal(now, np.where(s < 0.0, below, above)):
             return None

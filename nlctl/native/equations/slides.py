@@ -54,35 +54,34 @@ def _functions(graph: Graph, node: Expr) -> tuple[Expr, ...]:
 
 def of_both_sides(
     graph: Graph, exprs: Sequence[Expr], changing: Sequence[Expr], sides: Sequence[Sequence[float]],
-    function: Expr,
+    beyond: Expr | None = None,
 ) -> tuple[list[Expr], list[Expr]]:  # fmt: skip
-    """Return expressions as they are below and above, each continued beyond its side."""
-    continued = [
-        _continued(graph, node, values, function)
+    """Return expressions as they are below and above, next to where a switching function is 0."""
+    # With the function (`beyond`) also farther away, and each continued on the other side.
+    both = [
+        _continued(graph, node, values, beyond)
         for node, values in zip(changing, sides, strict=True)
     ]
     below, above = (
-        _folded(
-            graph, exprs, {node: both[k] for node, both in zip(changing, continued, strict=True)}
-        )
+        _folded(graph, exprs, {node: one[k] for node, one in zip(changing, both, strict=True)})
         for k in range(2)
     )
     return below, above
 
 
 def _continued(
-    graph: Graph, node: Expr, values: Sequence[float], function: Expr
+    graph: Graph, node: Expr, values: Sequence[float], beyond: Expr | None
 ) -> tuple[Expr, Expr]:
-    """Return what a comparison is below and above, also where the function is on the other side."""
-    if node.op in _EQUAL or len(_functions(graph, node)) == 1:
+    """Return what a comparison is below and above."""
+    if beyond is None or node.op in _EQUAL or len(_functions(graph, node)) == 1:
         low, high = (graph.const(bool(v) if node.kind == "b" else float(v)) for v in values)
         return low, high
     if values[0] == values[1]:
         return node, node
     # It switches elsewhere, too: on the other side it is the opposite of what it would be here.
     opposite = graph.op("not" if node.kind == "b" else "neg", node)
-    ways = (graph.op(beyond, function, graph.const(0.0)) for beyond in ("gt", "lt"))
-    low, high = (_either(graph, beyond, opposite, node) for beyond in ways)
+    ways = (graph.op(side, beyond, graph.const(0.0)) for side in ("gt", "lt"))
+    low, high = (_either(graph, way, opposite, node) for way in ways)
     return low, high
 
 
@@ -121,10 +120,10 @@ class _Between:
     changing: tuple[Expr, ...]
 
     def blended(self, exprs: Sequence[Expr], v: Expr) -> list[Expr]:
-        """Return expressions as they are at a `v` between both sides."""
+        """Return expressions as they are at a `v` between both sides, next to these."""
         op, half = self.graph.op, self.graph.const(0.5)
         blended = []
-        for a, b in zip(*self._sides(exprs), strict=True):
+        for a, b in zip(*self._sides(exprs, None), strict=True):
             mean, apart = op("mul", half, op("add", a, b)), op("mul", half, op("sub", b, a))
             blended.append(a if a is b else op("add", mean, op("mul", v, apart)))
         return blended
@@ -133,15 +132,15 @@ class _Between:
         """Return expressions as they are on the side that the relay's memory says, or between."""
         op, const = self.graph.op, self.graph.const
         below, above = op("lt", self.kept, const(0.0)), op("gt", self.kept, const(0.0))
-        chosen = []
-        for a, b, between in zip(*self._sides(exprs), self.blended(exprs, v), strict=True):
+        sides, chosen = self._sides(exprs, self.function), []
+        for a, b, between in zip(*sides, self.blended(exprs, v), strict=True):
             inner = op("select", above, b, between)
-            chosen.append(a if a is b else op("select", below, a, inner))
+            chosen.append(a if a is b is between else op("select", below, a, inner))
         return chosen
 
-    def _sides(self, exprs: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+    def _sides(self, exprs: Sequence[Expr], beyond: Expr | None) -> tuple[list[Expr], list[Expr]]:
         sides = self.node.slide.sides if self.node.slide else ()
-        return of_both_sides(self.graph, exprs, self.changing, sides, self.function)
+        return of_both_sides(self.graph, exprs, self.changing, sides, beyond)
 
 
 def _by_terms(
