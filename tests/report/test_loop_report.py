@@ -240,3 +240,19 @@ def test_what_switches_is_said_whoever_declares_it(blocks, found):
     checks = checks_of(loop, nlctl.input_output_response(loop, TIMES, 1.0), {})
     (check,) = [check for check in checks if check.what == "Steps end where equations switch"]
     assert (check.found, check.status) == (found, "pass")
+
+
+def test_a_run_that_slides_says_so_and_nothing_of_either_side_alone():
+    """x' = 1/2 - sign(x) rests at 0: neither side has an equilibrium there."""
+    friction = ct.nlsys(
+        lambda t, x, u, p: 0.5 - np.sign(x), None, states=1, inputs=0, outputs=1, name="friction"
+    )
+    checks = checks_of(
+        friction, nlctl.input_output_response(friction, np.linspace(0, 4, 41), 0, 1.0), {}
+    )
+    by_name = {check.what: check for check in checks}
+    switches = by_name["Steps end where equations switch"]
+    assert switches.status == "caution"
+    assert "slides along sign of block 'friction'" in switches.found
+    assert by_name["The run does not depend on its tolerances"].status == "pass"
+    assert by_name["The state at the end is a stable equilibrium"].status == "not applicable"
