@@ -173,7 +173,7 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     if (run.lanes["status"] >= 0).all():  # all are over
         return run
     lanes = asked(run.lanes, paces).nonzero()[0]
-    if not len(lanes) or run.task.fixed != 0.0:
+    if not len(lanes):
         return go_on(run, probe) if RUNNING in run.lanes["status"] else run
     return _examined(run, [int(j) for j in lanes], probe)
 

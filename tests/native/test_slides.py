@@ -266,3 +266,14 @@ def test_other_jumps_end_with_the_reason(update):
 def test_slide_is_a_truth_value():
     with pytest.raises(nlctl.errors.ParameterError, match="slide must be True or False, got 'no'"):
         nlctl.input_output_response(plain(from_both_sides, 1), [0, 2.0], 0, 0.0, slide="no")
+
+
+def test_a_fixed_step_has_an_end_as_well():
+    """Each step would end at the condition: it was as many as there are numbers in between."""
+    times = np.linspace(0, 2, 9)
+    run = nlctl.input_output_response(plain(from_both_sides, 1), times, 0, 0.0, step=0.01)
+    assert run.states[0] == pytest.approx(np.minimum(times, 0.5), abs=1e-9)
+    with pytest.raises(nlctl.errors.ChatteringError):
+        nlctl.input_output_response(
+            plain(from_both_sides, 1), times, 0, 0.0, step=0.01, slide=False
+        )
