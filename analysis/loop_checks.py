@@ -139,7 +139,10 @@ def _switching(loop: System, response: Any, params: dict[str, Any]) -> _Answer |
         "of blocks": reading.program.switching,
     }
     if slides := response.statistics.slides:
-        return f"it slides along {', '.join(slides)}: a real switch has a delay, and wears", "caution"
+        return (
+            f"it slides along {', '.join(slides)}: a real switch has a delay, and wears",
+            "caution",
+        )
     located = [f"{counted(n, 'condition')} {whose}" for whose, n in numbers.items() if n]
     return f"{' and '.join(located)} located" if located else "nothing switches", "pass"
 
@@ -179,7 +182,10 @@ def _rest(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
         )
         return finding, "not applicable"
     if response.statistics is not None and response.statistics.slides:
-        return "it slides along a condition, where neither side's equations say it", "not applicable"
+        return (
+            "it slides along a condition, where neither side's equations say it",
+            "not applicable",
+        )
     t, x, u = float(response.time[-1]), response.x[:, -1], response.u[:, -1]
     share = _still_moves(loop, response, params)
     if not np.max(share) <= _REST:

@@ -149,7 +149,7 @@ class ChatteringError(DivergedError):
     >>> import numpy as np
     >>> holds = ct.nlsys(lambda t, x, u, params: -np.sign(x), inputs=0, states=1, name="holds")
     >>> try:
-    ...     nlctl.input_output_response(holds, [0.0, 2.0], 0, [1.0])
+    ...     nlctl.input_output_response(holds, [0.0, 2.0], 0, [1.0], slide=False)
     ... except nlctl.errors.ChatteringError as error:
     ...     print(round(error.time, 3))
     1.0

@@ -30,7 +30,7 @@ from .equations.slides import changing_at, of_both_sides
 from .happened import row_labels
 from .results import Trajectory
 
-MOST = 8  # conditions of one run that slide
+_MOST = 8  # conditions of one run that slide
 _AROUND = 64  # points
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
@@ -187,7 +187,7 @@ def sliding(
     # `run` has a diagram, an initial state and a parameter vector.
     x0, p = start
     last = SlidRun(compiled=compiled, p=p, reached=reached)
-    while (jump := last.reached.statistics.jump) is not None and len(last.slides) < MOST:
+    while (jump := last.reached.statistics.jump) is not None and len(last.slides) < _MOST:
         done = last.reached.statistics
         scale = done.atol + done.rtol * np.maximum(np.abs(jump.before), np.abs(jump.after))
         more = slides_at(last.compiled, last.p, jump, scale)

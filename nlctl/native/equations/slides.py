@@ -29,7 +29,7 @@ from .located import Conditions, sign_key
 from .reader import Reader, vector_of
 from .relays import kept_of, limits_of, relay_places
 
-Results = dict[str, list[tuple[int, Tracer]]]
+_Results = dict[str, list[tuple[int, Tracer]]]
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
 _JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside")
 _BLENDED = ("dx", "g", "y")
@@ -177,8 +177,8 @@ def _by_terms(
 
 
 def with_slides(
-    reader: Reader, schedule: Schedule, results: Results, conditions: Conditions
-) -> tuple[Results, Conditions]:
+    reader: Reader, schedule: Schedule, results: _Results, conditions: Conditions
+) -> tuple[_Results, Conditions]:
     """Return results and conditions of equations that have been read, with what slides."""
     slides = _slides(reader, results, conditions)
     if not slides:
@@ -197,7 +197,7 @@ def with_slides(
     return _with_relays(reader, slid, conditions, slides, derived)
 
 
-def _slides(reader: Reader, results: Results, conditions: Conditions) -> list[_Between]:
+def _slides(reader: Reader, results: _Results, conditions: Conditions) -> list[_Between]:
     """Return what slides stand for, of those nodes that are slides."""
     graph, first = reader.graph, len(relay_places(reader.blocks))
     every = [*_pieces(results), *(e for part in reader.fixed_points.values() for e in part)]
@@ -220,7 +220,7 @@ def _slides(reader: Reader, results: Results, conditions: Conditions) -> list[_B
 
 
 def _derived(
-    reader: Reader, schedule: Schedule, results: Results, slides: Sequence[_Between]
+    reader: Reader, schedule: Schedule, results: _Results, slides: Sequence[_Between]
 ) -> list[SlidingRate]:
     """Return rates and outputs of the relays that stand for conditions."""
     graph = reader.graph
@@ -257,7 +257,7 @@ def _derived(
 
 
 def _check_apart(
-    reader: Reader, schedule: Schedule, results: Results, changed: Callable[..., list[Expr]]
+    reader: Reader, schedule: Schedule, results: _Results, changed: Callable[..., list[Expr]]
 ) -> None:
     """Refuse a slide of which more depends than rates and outputs: these have no mean."""
     others = [e for part in reader.fixed_points.values() for e in part]
@@ -269,9 +269,9 @@ def _check_apart(
 
 
 def _with_relays(
-    reader: Reader, results: Results, conditions: Conditions, slides: Sequence[_Between],
+    reader: Reader, results: _Results, conditions: Conditions, slides: Sequence[_Between],
     derived: Sequence[SlidingRate],
-) -> tuple[Results, Conditions]:  # fmt: skip
+) -> tuple[_Results, Conditions]:  # fmt: skip
     """Return results with what relays declare and remember, and without what they stand for."""
     declared, kept = dict[int, Tracer](), dict[int, Tracer]()
     counts = [count_switching_functions(node) for node in reader.blocks]
@@ -308,7 +308,7 @@ def _changed(
     return new
 
 
-def _pieces(results: Results) -> list[Expr]:
+def _pieces(results: _Results) -> list[Expr]:
     return [e for rows in results.values() for _, array in rows for e, _ in array.pieces()]
 
 
