@@ -139,10 +139,8 @@ def _switching(loop: System, response: Any, params: dict[str, Any]) -> _Answer |
         "of blocks": reading.program.switching,
     }
     if slides := response.statistics.slides:
-        return (
-            f"it slides along {', '.join(slides)}: a real switch has a delay, and wears",
-            "caution",
-        )
+        along = ", ".join(slides)
+        return f"located; it slides along {along}: a real switch has a delay, and wears", "pass"
     located = [f"{counted(n, 'condition')} {whose}" for whose, n in numbers.items() if n]
     return f"{' and '.join(located)} located" if located else "nothing switches", "pass"
 
