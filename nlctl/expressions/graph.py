@@ -395,7 +395,8 @@ class Graph:
             return size if np.copysign(1.0, b.data) > 0.0 else self.op("neg", size)
         if name == "sub" and is_const[0] and a.data == 0.0:
             return self.op("neg", b)
-        return a.args[0] if name == "neg" and a.op == "neg" else within_limits(self, name, a, b)
+        inner = a.args[0] if name == "neg" and a.op == "neg" else None
+        return within_limits(self, name, a, b) if name in ("eq", "ne") else inner
 
     def _choice_of_pieces(self, condition: Expr, a: Expr, b: Expr) -> Expr | None:
         """Choose piece by piece: what is the same on both ways depends on no condition."""

@@ -15,7 +15,7 @@ _BEYOND = {"minimum": "gt", "maximum": "lt"}
 def within_limits(graph: Any, name: str, a: Any, b: Any) -> Any:
     """Return `eq` or `ne` of a number and the same within limits, by orders; None of others."""
     for number, limited in ((a, b), (b, a)):
-        if name in ("eq", "ne") and _is_within(number, limited):
+        if _is_within(number, limited):
             equal = _equal(graph, number, limited)
             return equal if name == "eq" else graph.op("not", equal)
     return None

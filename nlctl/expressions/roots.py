@@ -127,8 +127,7 @@ def brentq(
     disp=True,
 ):  # fmt: skip
     """Return a root between two places with values of opposite signs, by Brent's method."""
-    args = args if isinstance(args, tuple) else (args,)
-    root = with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter, _bent), args)
+    root = _with_slope_by_brent(f, a, b, args, xtol, rtol, maxiter, _bent)
     return _reported(root, "brentq", full_output, disp)
 
 
@@ -137,8 +136,7 @@ def brenth(
     disp=True,
 ):  # fmt: skip
     """Return a root between two places, by Brent's method with hyperbolas."""
-    args = args if isinstance(args, tuple) else (args,)
-    root = with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter, _hyperbola), args)
+    root = _with_slope_by_brent(f, a, b, args, xtol, rtol, maxiter, _hyperbola)
     return _reported(root, "brenth", full_output, disp)
 
 
@@ -165,6 +163,11 @@ def fixed_point(func, x0, args=(), xtol=1e-8, maxiter=500, method="del2"):
             return p
         p0 = p
     raise RuntimeError("Failed to converge")
+
+
+def _with_slope_by_brent(f, a, b, args, xtol, rtol, maxiter, bent):
+    args = args if isinstance(args, tuple) else (args,)
+    return with_slope(f, _by_brent(f, a, b, args, xtol, rtol, maxiter, bent), args)
 
 
 def _by_brent(f, a, b, args, xtol, rtol, maxiter, bent):

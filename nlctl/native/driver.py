@@ -36,7 +36,7 @@ from .machine.routine import entries_of
 from .results import Statistics, Trajectory, at_its_end, made
 from .run import Run
 from .settings import METHODS, Settings
-from .slid import sliding
+from .slid import SlidRun, sliding
 from .spare import give_back, workspace
 from .taylor.method import with_taylor
 from .taylor.turns import turned, with_turns
@@ -77,19 +77,29 @@ def followed_up(
     progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
     """Return a run; again, with functions called that have cut it short, or where it slides."""
+    if not reached.cut:
+        return slid_from(course, reached, x0, p, progress).of_diagram(course.compiled)
+    compiled, cut = course.compiled, reached.cut
+    again = run_once(replace(course, compiled=compiled.calling(cut)), x0, p, progress)
+    called = described_functions(compiled.schedule, cut)
+    return replace(again, cut=cut, statistics=replace(again.statistics, called=called))
+
+
+def slid_from(
+    course: Course,
+    reached: Trajectory,
+    x0: np.ndarray,
+    p: np.ndarray,
+    progress: Callable[[float], object] | None = None,
+) -> SlidRun:
+    """Return a run that chatters again, along the conditions at which it does, if it may slide."""
 
     def run(compiled: Compiled, x0: np.ndarray, p: np.ndarray) -> Trajectory:
         return run_once(replace(course, compiled=compiled), x0, p, progress)
 
-    if reached.statistics.jump is not None and course.settings.slide:
-        span = float(np.ptp(course.times))
-        return sliding(run, course.compiled, reached, (x0, p), span).of_diagram(course.compiled)
-    if not reached.cut:
-        return reached
-    compiled, cut = course.compiled, reached.cut
-    again = run(compiled.calling(cut), x0, p)
-    called = described_functions(compiled.schedule, cut)
-    return replace(again, cut=cut, statistics=replace(again.statistics, called=called))
+    if not course.settings.slide:
+        return SlidRun(compiled=course.compiled, p=p, reached=reached)
+    return sliding(run, course.compiled, reached, (x0, p), float(np.ptp(course.times)))
 
 
 def run_once(

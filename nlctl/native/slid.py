@@ -26,6 +26,7 @@ from .diagram.parameters import length, slots_of
 from .diagram.program import count_switching_functions, memory
 from .diagram.schedule import stand_in
 from .equations.blocks import Equations
+from .equations.relays import slide_places
 from .equations.slides import changing_at, of_both_sides
 from .happened import row_labels
 from .results import Trajectory
@@ -259,8 +260,7 @@ def _relay(slide: Slide, state: int) -> Node:
 def _parameters(slid: Compiled, p: np.ndarray, far: Sequence[float], span: float) -> np.ndarray:
     """Return all parameters, with those of relays by how far functions are from 0 at rest."""
     whole = np.append(p, np.zeros(length(slid.program.layout) - p.size))
-    places = [i for i, node in enumerate(slid.schedule.nodes) if node.slide is not None]
-    for i, rest in zip(places, far, strict=True):
+    for i, rest in zip(slide_places(slid.schedule.nodes), far, strict=True):
         values = {
             "height": 1.0, "rest": rest, "rate": _RATE / span, "rest_rate": _REST_RATE * rest,
         }  # fmt: skip

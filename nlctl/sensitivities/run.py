@@ -13,14 +13,14 @@ import numpy as np
 from ..errors import CompileError, InexactWarning
 from ..native import Compiled
 from ..native.audit import Trial, audit
-from ..native.driver import Course, begin, prepared, run_once
+from ..native.driver import Course, begin, prepared, run_once, slid_from
 from ..native.floats import with_floats
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
-from ..native.slid import SlidRun, sliding
+from ..native.slid import SlidRun
 from ..native.spare import give_back
 from ..responses.arguments import held, input_array, state_array
 from .beginning import Arrays, commits_at_start, evaluated_rows
@@ -128,15 +128,11 @@ def _slid(
     compiled: Compiled, run: RunWithDerivatives, reached: Trajectory, given: tuple[np.ndarray, ...]
 ) -> SlidRun:
     """Return the run without derivatives that slides, if the one with them switches without end."""
-    (u, x0, p), status = given, reached.statistics.status
-    if status not in (Status.ZENO, Status.CHATTERING) or not run.settings.slide:
+    u, x0, p = given
+    course = _course(compiled, run, u)
+    if reached.statistics.status not in (Status.ZENO, Status.CHATTERING):
         return SlidRun(compiled=compiled, p=p, reached=reached)
-
-    def alone(compiled: Compiled, x0: np.ndarray, p: np.ndarray) -> Trajectory:
-        return run_once(_course(compiled, run, u), x0, p)
-
-    span = float(np.ptp(run.times))
-    return sliding(alone, compiled, alone(compiled, x0, p), (x0, p), span)
+    return slid_from(course, run_once(course, x0, p), x0, p)
 
 
 def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:

@@ -28,7 +28,7 @@ from ..diagram.trace import time
 from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
 from .reader import Reader, vector_of
-from .relays import with_sliding
+from .relays import slide_places, with_sliding
 from .slides import with_slides
 
 
@@ -125,8 +125,7 @@ def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
 
 def _of_slides(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
     """Return outputs of relays that stand for conditions: no signal is made of them."""
-    places = [i for i, node in enumerate(schedule.nodes) if node.slide is not None]
-    return {i: full(graph, 1, 0.0) for i in places}
+    return {i: full(graph, 1, 0.0) for i in slide_places(schedule.nodes)}
 
 
 def _conditions(
@@ -231,6 +230,6 @@ def _states_now(reader: Reader, schedule: Schedule, become: Mapping[int, Tracer]
     for place in sorted(known):
         parts += [leaf_vector(graph, "x", at, (place - at,)), known[place]]
         at = place + 1
-    slides = sum(node.slide is not None for node in reader.blocks)  # no states of the diagram
+    slides = len(slide_places(reader.blocks))  # no states of the diagram
     rest = leaf_vector(graph, "x", at, ((schedule.system.nstates or 0) - slides - at,))
     return concatenated(graph, [*parts, rest])

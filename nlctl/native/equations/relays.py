@@ -33,7 +33,7 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
     if not places:
         return reader
     leaves = [graph.leaf(OUTPUTS, k, None) for k in range(len(places))]
-    relay_outputs = {i: _array(graph, [leaf]) for i, leaf in zip(places, leaves, strict=True)}
+    relay_outputs = {i: array_of(graph, [leaf]) for i, leaf in zip(places, leaves, strict=True)}
     first = replace(
         reader,
         supplied={**reader.supplied, **relay_outputs},
@@ -56,22 +56,29 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
     ]
 
     def output(k: int, known: Sequence[Expr]) -> Expr:
-        return first.relay_output(places[k], _array(graph, known))[0].only
+        return first.relay_output(places[k], array_of(graph, known))[0].only
 
     motion = Motion(
         rates=_rates(first), solutions=first.fixed_points, inputs=schedule.system.ninputs or 0,
         behind=schedule.ninputs - schedule.rates,
     )  # fmt: skip
-    derived = sliding_rates(graph, relays, motion, output)
-    outputs = {i: _array(graph, [f.output]) for i, f in zip(places, derived, strict=True)}
+    derived = dict(zip(places, sliding_rates(graph, relays, motion, output), strict=True))
+    outputs = {i: array_of(graph, [f.output]) for i, f in derived.items()}
+    moving = {i: array_of(graph, [f.drift, f.gain]) for i, f in derived.items()}
     return replace(
         reader,
         supplied={**reader.supplied, **outputs},
-        moving={i: _array(graph, [f.drift, f.gain]) for i, f in zip(places, derived, strict=True)},
+        moving=moving,
     )
 
 
-def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
+def slide_places(blocks: Sequence[Node]) -> list[int]:
+    """Return the numbers of the blocks that are ideal relays for conditions."""
+    return [i for i, node in enumerate(blocks) if node.slide is not None]
+
+
+def array_of(graph: Graph, parts: Sequence[Expr]) -> Tracer:
+    """Return expressions, one after the other."""
     return concatenated(graph, [vector_of(graph, part) for part in parts])
 
 

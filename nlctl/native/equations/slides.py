@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import CompileError
-from ...expressions.arrays import Tracer, as_array, concatenated
+from ...expressions.arrays import Tracer, as_array
 from ...expressions.conditions import switching_functions
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
 from ..diagram.nodes import Node
@@ -26,8 +26,8 @@ from ..diagram.program import count_switching_functions, memory
 from ..diagram.schedule import Schedule
 from ..sliding.rates import OUTPUTS, Motion, SlidingInput, SlidingRate, sliding_rates
 from .located import Conditions, sign_key
-from .reader import Reader, vector_of
-from .relays import kept_of, limits_of, relay_places
+from .reader import Reader
+from .relays import array_of, kept_of, limits_of, relay_places
 
 _Results = dict[str, list[tuple[int, Tracer]]]
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
@@ -247,7 +247,7 @@ def _derived(
     ]  # fmt: skip
 
     def output(k: int, known: Sequence[Expr]) -> Expr:
-        return reader.relay_output(slides[k].place, _array(graph, known))[0].only
+        return reader.relay_output(slides[k].place, array_of(graph, known))[0].only
 
     motion = Motion(
         rates=blended([rates[row] for row in sorted(rates)]), solutions=reader.fixed_points,
@@ -278,7 +278,7 @@ def _with_relays(
     memories = [len(memory(node)) for node in reader.blocks]
     for slide, rate in zip(slides, derived, strict=True):
         i, given = slide.place, [slide.function, rate.drift, rate.gain]
-        events = reader.events(i, _array(reader.graph, given))
+        events = reader.events(i, array_of(reader.graph, given))
         declared[sum(counts[:i])] = events[: counts[i]]
         kept[sum(memories[:i])] = events[counts[i] :]
     gone = {place for slide in slides if slide.node.slide for place in slide.node.slide.places}
@@ -310,10 +310,6 @@ def _changed(
 
 def _pieces(results: _Results) -> list[Expr]:
     return [e for rows in results.values() for _, array in rows for e, _ in array.pieces()]
-
-
-def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
-    return concatenated(graph, [vector_of(graph, part) for part in parts])
 
 
 def _who(node: Node) -> str:
