@@ -138,8 +138,7 @@ def _switching(loop: System, response: Any, params: dict[str, Any]) -> _Answer |
         "of the equations": response.statistics.conditions,
         "of blocks": reading.program.switching,
     }
-    if slides := response.statistics.slides:
-        along = ", ".join(slides)
+    if along := response.statistics.along:
         return f"located; it slides along {along}: a real switch has a delay, and wears", "pass"
     located = [f"{counted(n, 'condition')} {whose}" for whose, n in numbers.items() if n]
     return f"{' and '.join(located)} located" if located else "nothing switches", "pass"

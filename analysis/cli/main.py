@@ -106,7 +106,7 @@ def simulate(
     signals = dict(zip(response.output_labels, response.y, strict=True))
     show_metrics(times, signals)
     if response.statistics is not None and response.statistics.slides:
-        notify(f"it slides along {', '.join(response.statistics.slides)}")
+        notify(f"it slides along {response.statistics.along}")
     if small := response.small_outputs():
         notify(small)
     if csv is not None:

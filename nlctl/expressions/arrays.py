@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from .graph import SMALL, Expr, Graph, Untraceable, catchable
+from .graph import Expr, Graph, Untraceable, catchable
 
 _MOST = 2048  # elements of an array that are kept individually
 _TABLED = 256  # elements of a constant matrix beyond which each row is a table
@@ -223,7 +223,7 @@ class Tracer:
             return self._part(parts, None, 1) if parts.shape else Tracer(self.graph, parts)
         indices = range(self.length)[along]
         place = self._place(along) if self.ndim == 1 and not keys else None
-        if len(indices) <= SMALL:
+        if len(indices) <= self.graph.small:
             parts = [mapped(lambda e, k=k: self.graph.item(e, k), cells) for k in indices]
             return self._part(_stacked(parts, before, cells.shape), None, 1, place)
         start, step, size = indices.start, indices.step, len(indices)
@@ -241,7 +241,7 @@ class Tracer:
         """Return copies of the elements at places that are fixed, as NumPy finds them."""
         places = np.arange(self.size).reshape(self.shape)[key]
         indices = places.reshape(-1)
-        if self.axis is None or indices.size <= SMALL or self.ndim > 1:
+        if self.axis is None or indices.size <= self.graph.small or self.ndim > 1:
             return Tracer(self.graph, as_array(self.elements()[key]))
         steps = np.unique(np.diff(indices))
         if places.ndim > 1 or steps.size != 1 or steps[0] == 0:
@@ -300,7 +300,7 @@ class Tracer:
         return self._part(cells, None, 1)
 
     def _as_long_if_many(self) -> Tracer:
-        many = self.axis is None and self.ndim == 1 and self.size > SMALL
+        many = self.axis is None and self.ndim == 1 and self.size > self.graph.small
         return self.as_long() if many else self
 
     def as_long(self) -> Tracer:
@@ -398,11 +398,11 @@ def traced(graph: Graph, value: object) -> Tracer:
         if any(p.shape != parts[0].shape for p in parts):
             raise Untraceable("rows of different lengths")
         if parts and any(p.axis is not None for p in parts):
-            if any(p.axis != 0 or p.ndim != 1 for p in parts) or len(parts) > SMALL:
+            if any(p.axis != 0 or p.ndim != 1 for p in parts) or len(parts) > graph.small:
                 return Tracer(graph, np.stack([p.elements() for p in parts]))
             rows = _stacked([p.cells for p in parts], 0, ())
             return Tracer(graph, rows, 1, parts[0].length)
-        if len(parts) > SMALL and parts[0].ndim == 0:
+        if len(parts) > graph.small and parts[0].ndim == 0:
             return concatenated(graph, [p.reshape(1) for p in parts])
         return Tracer(graph, _stacked([p.cells for p in parts], 0, ()))
     if not (type(value) is np.ndarray or isinstance(value, bool | int | float | np.generic)):
@@ -420,7 +420,7 @@ def _is_number(value: object) -> bool:
 
 
 def _constants(graph: Graph, array: np.ndarray) -> Tracer:
-    long = [i for i, n in enumerate(array.shape) if n > SMALL]
+    long = [i for i, n in enumerate(array.shape) if n > graph.small]
     is_large = array.size > _TABLED and array.shape[0] <= _TABLED
     by_rows = len(long) == 1 or is_large
     if not long or not by_rows or array.ndim > 2 or array.dtype != float:
@@ -439,7 +439,7 @@ def leaf_vector(
 ) -> Tracer:
     """Return part of an argument of the program as an array of the given shape."""
     numbers = np.arange(start, start + int(np.prod(shape))).reshape(shape)
-    long = [i for i, n in enumerate(shape) if n > SMALL]
+    long = [i for i, n in enumerate(shape) if n > graph.small]
     if not long or len(shape) > 2:
         if numbers.size > _MOST:
             raise Untraceable("a large matrix")
@@ -462,14 +462,14 @@ def full(graph: Graph, shape: Any, value: object) -> Tracer:
     number = traced(graph, value)
     if number.size != 1 or number.only.kind != "f":
         raise Untraceable("an array that is filled with something else than one float")
-    long = [i for i, n in enumerate(shape) if n > SMALL]
+    long = [i for i, n in enumerate(shape) if n > graph.small]
     if len(long) > 1 or len(shape) > 2:
         if np.prod(shape) > _MOST:
             raise Untraceable("a large matrix")
         cells = np.empty(shape, dtype=object)
         cells.fill(number.only)
         return Tracer(graph, cells)
-    cells = np.empty([n for n in shape if n <= SMALL], dtype=object)
+    cells = np.empty([n for n in shape if n <= graph.small], dtype=object)
     cells.fill(number.only)
     return Tracer(graph, cells, *([long[0], shape[long[0]]] if long else []))
 
@@ -479,7 +479,7 @@ def concatenated(graph: Graph, parts: Sequence[Tracer]) -> Tracer:
     if any(p.ndim != 1 for p in parts):
         raise Untraceable("joining matrices or numbers")
     size = sum(p.size for p in parts)
-    if size <= SMALL:
+    if size <= graph.small:
         return Tracer(graph, np.concatenate([p.cells.reshape(-1) for p in parts]))
     pieces: list[tuple[Expr, int]] = []
     for part in parts:

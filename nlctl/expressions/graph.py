@@ -1,6 +1,6 @@
 """Expressions: what a diagram computes, each once.
 
-An expression is a number, or a vector of more than `SMALL` numbers that is computed in a loop.
+An expression is a number, or a vector of more than `small` numbers that is computed in a loop.
 A graph keeps one copy of each, so that sin(x1) of one block is that of another, and evaluates
 constants.  It never changes the order of a sum.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from .limits import within_limits
 from .signs import sign_of
 
-SMALL = 8  # arrays up to this size are numbers of their own, longer ones are loops
+SMALL = 8
 BUDGET = 3000  # expressions of one function, beyond which it is better called than written out
 UNLIMITED = 10**9
 COMPARISONS = {"lt": "less", "le": "less_equal", "gt": "greater", "ge": "greater_equal",
@@ -146,8 +146,9 @@ class Graph:
 
     nothing_fails = True  # whether a way that returns nothing is one that raises an error
 
-    def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
+    def __init__(self, lengths: Mapping[str, int] | None = None, small: int = SMALL) -> None:
         self.nodes: list[Expr] = []
+        self.small = small  # arrays up to this size are numbers of their own, longer ones are loops
         self.settles = False  # whether conditions of parameters that are integers are decided
         self.merges = False  # whether choices of numbers are followed at once, not way by way
         self.limit = UNLIMITED  # largest number of expressions for now
@@ -470,12 +471,10 @@ class Graph:
         pieces, at = [], 0
         for piece, length in zip(vector.args, vector.data, strict=True):
             begin, end = max(start - at, 0), min(start + size - at, length)
-            if begin < end:
-                single = end - begin == 1
-                kept = (
-                    self.item(piece, begin) if single else self.part(piece, begin, 1, end - begin)
-                )
-                pieces.append((kept, end - begin))
+            if end - begin == 1:
+                pieces.append((self.item(piece, begin), 1))
+            elif begin < end:
+                pieces.append((self.part(piece, begin, 1, end - begin), end - begin))
             at += length
         return self.joined(pieces)
 

@@ -26,7 +26,7 @@ from .arrays import (
     scalar,
     traced,
 )
-from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable, needed
+from .graph import Ambiguous, Expr, Graph, Namespace, Untraceable, needed
 from .integers import shifted, with_bits
 from .promoted import is_numpys, widened
 
@@ -172,7 +172,7 @@ def product(a: Tracer, b: Tracer) -> Tracer:
         return _batched(a, b)
     if a.shape[-1] != b.shape[0]:
         raise Untraceable(f"a product of shapes {a.shape} and {b.shape}")
-    if b.ndim == 1 and b.axis is None and b.size > SMALL and a.axis == a.ndim - 1:
+    if b.ndim == 1 and b.axis is None and b.size > a.graph.small and a.axis == a.ndim - 1:
         b = b.as_long()
     if b.ndim == 2:
         a = (a.short() if b.axis == 1 else a)[..., None]  # rows that are long stay in one piece

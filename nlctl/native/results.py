@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -43,6 +44,12 @@ class Statistics:
     slides: tuple[str, ...] = ()
     rtol: float = np.nan  # Tolerances of steps; none in discrete time.
     atol: float = np.nan
+
+    @property
+    def along(self) -> str:
+        """Along what it has slid, in words."""
+        counts = Counter(self.slides).items()
+        return ", ".join(f"{n} x {name}" if n > 1 else name for name, n in counts)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,10 +29,13 @@ from .equations.blocks import Equations
 from .equations.relays import slide_places
 from .equations.slides import changing_at, of_both_sides
 from .happened import row_labels
+from .integrate.state import Status
 from .results import Trajectory
 
-_MOST = 8  # conditions of one run that slide
+_MOST = 24  # conditions of one run that slide
+_NUMBERS = 64  # elements of an array that slide one by one
 _AROUND = 64  # points
+_AHEAD = 1e-9  # times the run's length: what comes no further has not slid
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
 
@@ -187,11 +190,13 @@ def sliding(
     """Return a run that chatters no longer, if relays can stand for the conditions of that."""
     # `run` has a diagram, an initial state and a parameter vector.
     x0, p = start
-    last = SlidRun(compiled=compiled, p=p, reached=reached)
+    last = best = SlidRun(compiled=compiled, p=p, reached=reached)
     while (jump := last.reached.statistics.jump) is not None and len(last.slides) < _MOST:
         done = last.reached.statistics
         scale = done.atol + done.rtol * np.maximum(np.abs(jump.before), np.abs(jump.after))
         more = slides_at(last.compiled, last.p, jump, scale)
+        if not more and _has_loops(compiled):
+            return sliding(run, _in_numbers(compiled), reached, start, span)
         if not more:
             break
         slides = (*last.slides, *((_counted(slide, last.slides), far) for slide, far in more))
@@ -201,10 +206,27 @@ def sliding(
             further = run(diagram, np.append(x0, np.zeros(len(slides))), whole)
         except (CompileError, ParameterError):
             break
-        if not further.statistics.time > done.time:
-            break
         last = SlidRun(compiled=diagram, p=whole, reached=further, slides=slides)
-    return last
+        # of relays whose inputs depend on each other no output is known: it ends where that is so
+        ahead = further.statistics.time - best.reached.statistics.time
+        if further.statistics.status is Status.OK or ahead > _AHEAD * span:
+            best = last
+    return best
+
+
+def _has_loops(compiled: Compiled) -> bool:
+    """Whether conditions are of arrays that are read as loops, and could be read as numbers."""
+    located = compiled.equations.conditions.located
+    return compiled.schedule.small < _NUMBERS and any(one.function.size for one in located)
+
+
+def _in_numbers(compiled: Compiled) -> Compiled:
+    """Return a diagram each element of whose arrays is a number of its own."""
+    schedule = replace(compiled.schedule, small=_NUMBERS)
+    whole = replace(compiled, schedule=schedule, original=None, apart=None)
+    return compiled.cache.found(
+        Slid, lambda each: not each.slides, lambda: Slid(slides=(), compiled=whole)
+    ).compiled
 
 
 def _counted(slide: Slide, before: Sequence[tuple[Slide, float]]) -> Slide:

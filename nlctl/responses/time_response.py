@@ -172,7 +172,7 @@ class Response(ct.TimeResponseData):
             turns = f", {counted(run.turns, 'turn')} of memories" if run.turns else ""
             lines.append(f"  run      {run.status.name}, {steps}{turns}")
             if run.slides:
-                lines.append(f"  slides   along {', '.join(run.slides)}")
+                lines.append(f"  slides   along {run.along}")
             if run.called:
                 names = ", ".join(run.called)
                 lines.append(f"  called   {names}: a loop takes more passes than are written out")

@@ -13,7 +13,7 @@ from ..arithmetic import Arithmetic
 from ..arrays import Special, Tracer, as_array, scalar, traced
 from ..constants import constant_value
 from ..elimination import eliminated, is_zero, substituted
-from ..graph import SMALL, Expr, Graph, Untraceable
+from ..graph import Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
 from .complex_numbers import ComplexPair, holds_complex, paired
@@ -90,9 +90,9 @@ def _solved_as_one(graph: Graph, rows: _Rows, right: Tracer) -> Tracer:
     starts = range(0, len(rows) * columns, columns)
     if right.ndim == 1:
         items = Tracer(graph, as_array(whole), 0, len(rows))
-        return items if len(rows) > SMALL else items.short()
+        return items if len(rows) > graph.small else items.short()
     lines = [Tracer(graph, as_array(graph.part(whole, k, 1, columns)), 0, columns) for k in starts]
-    return traced(graph, lines if columns > SMALL else [line.short() for line in lines])
+    return traced(graph, lines if columns > graph.small else [line.short() for line in lines])
 
 
 def entries_written_out(graph: Graph, rows: _Rows, op: str) -> list[Any]:

@@ -22,6 +22,7 @@ from ...blocks import supplied_of, within
 from ...delays.transport import PAST
 from ...diagrams import places, samplings, supplied_blocks
 from ...errors import AlgebraicLoopError
+from ...expressions.graph import SMALL
 from ...responses.watched import Watched
 from ...sampling.system import Happening
 from ...sliding.relay import SLIDING
@@ -66,6 +67,7 @@ class Schedule:
     overrides: Mapping[str, Any] = field(default_factory=dict)  # parameters that they get
     # outputs of transport delays.  A run gives them as further inputs
     lines: tuple[Signal, ...] = ()
+    small: int = SMALL  # arrays up to this size are read as numbers, longer ones as loops
 
     @property
     def holders(self) -> tuple[Node, ...]:

@@ -73,7 +73,7 @@ def equations(
     """Write a schedule as expressions."""
     system = schedule.system
     sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
-    graph = Graph(sizes)
+    graph = Graph(sizes, schedule.small)
     reader = Reader(
         graph=graph, layout=layout, blocks=schedule.nodes, p=p,
         samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
