@@ -52,9 +52,8 @@ class Coulomb(_ForceLaw):
 
         force = F_c sign(velocity) + sigma_2 velocity
 
-    A force law for velocities that keep their sign, or change it.  It does not hold a mass at
-    rest: there the sign chatters, and a run ends as that; `StickSlip` and `LuGre` stick, and so
-    does `nlctl.IdealRelay` instead of the sign.
+    Where it holds a mass at rest a run slides along the sign, if it may, and else ends as
+    chattering, see `nlctl.input_output_response`; `StickSlip` and `LuGre` stick by themselves.
 
     Examples
     --------
@@ -80,7 +79,7 @@ class Stribeck(_ForceLaw):
         g(velocity) = F_c + (F_s - F_c) exp(-(velocity / v_s)^2)
 
     (Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30, 1994, p. 1083.)  With F_s = F_c it
-    is `Coulomb`; it does not hold a mass at rest either.
+    is `Coulomb`.  The friction that holds a mass at rest is F_s at most.
 
     Examples
     --------

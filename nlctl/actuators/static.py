@@ -163,10 +163,8 @@ class Quantiser(FromUToV):
     (Gersho, Gray, Vector Quantization and Signal Compression, 1992, section 5.2).  It obeys (2)
     with k = 1 and |eps_u| <= q / 2.
 
-    Its jumps are the zeros of a sine, which changes its sign at each: machine code locates them
-    unless one step passes an even number of them, which the error control of what v drives sees.
-    Around a loop in continuous time it may chatter along a jump; the run then ends as
-    `CHATTERING`, and says where.
+    Machine code locates its jumps.  Around a loop in continuous time it may slide along one, with
+    what is between two levels as its mean.
 
     Examples
     --------
@@ -184,10 +182,6 @@ class Quantiser(FromUToV):
     def output(t, x, u, p):
         half = np.where(p.riser, 0.5, 0.0)
         return (p.q * (np.floor(u[0] / p.q + 0.5 - half) + half),)
-
-    @equation
-    def switching(t, x, u, p):
-        return (np.sin(np.pi * (u[0] / p.q + np.where(p.riser, 0.0, 0.5))),)
 
     @equation
     def band(t, u, p):

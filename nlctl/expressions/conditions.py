@@ -153,6 +153,26 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     return tuple(part for product in (function, *edges) for part in sign_factors(graph, product))
 
 
+def zigzag(graph: Graph, condition: Expr) -> Expr | None:
+    """Return how far from an integer what `floor` counts is; None of what counts nothing."""
+    # Positive above an even one and below an odd one: it is continuous between integers.
+    if condition.op not in _OF_INTEGERS:
+        return None
+    counted = _counted(graph, condition)
+    nearest = graph.op("rint", counted)
+    return graph.op("mul", _sign(graph, nearest), graph.op("sub", counted, nearest))
+
+
+def of_zigzag(graph: Graph, condition: Expr) -> tuple[Expr, Expr]:
+    """Return what `floor` is next to an integer where its zigzag is negative, and positive."""
+    op, nearest = condition.op, graph.op("rint", _counted(graph, condition))
+    middle = 0.5 + _OF_INTEGERS[op]
+    parts = (graph.op("sub", nearest, graph.const(c)) for c in (middle, middle - 1.0))
+    below, above = (graph.op(op, part) for part in parts)
+    even = graph.op("gt", _sign(graph, nearest), graph.const(0.0))
+    return graph.op("select", even, below, above), graph.op("select", even, above, below)
+
+
 def is_of_places(condition: Expr) -> bool:
     """Return whether a condition switches at places that are counted: integers, or a table's."""
     return at_integers(condition) or _table_passed(condition) is not None

@@ -42,10 +42,21 @@ def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
     return _Reader(graph, lambda _: None, {}).partial
 
 
-def slope(graph: Graph, result: Expr, number: Expr) -> Expr:
+def slope(
+    graph: Graph,
+    result: Expr,
+    number: Expr,
+    fixed_points: Mapping[str, Sequence[Expr]] | None = None,
+) -> Expr | None:
     """Return the derivative of an expression by one that it is made of, all else fixed."""
-    reader = _Reader(graph, lambda _: None, {}, {number: graph.const(1.0)})
-    return reader.read([result])[0] or graph.const(0.0)
+    # NaN that it may be is fixed, too: it is there in the expression itself.
+    fixed = {part: None for part in needed([result]) if _is_nan(part)}
+    known = {**fixed, number: graph.const(1.0)}
+    return _Reader(graph, lambda _: None, fixed_points or {}, known).read([result])[0]
+
+
+def _is_nan(expr: Expr) -> bool:
+    return expr.op == "const" and expr.kind == "f" and math.isnan(expr.data)
 
 
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
@@ -126,7 +137,7 @@ class _Reader:
         """Return the derivative of an expression whose parts have theirs."""
         if node.op == "leaf":
             return self.seed(node)
-        if node.op == "const" and node.kind == "f" and math.isnan(node.data):
+        if _is_nan(node):
             return node
         parts = [self.known[arg] for arg in node.args]
         if node.op == "solve" and node.data[0] in self.fixed_points:

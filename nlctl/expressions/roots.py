@@ -52,7 +52,8 @@ class SlopeOfRoot(Special):
         if value.shape:
             return root
         with in_passes(graph):
-            step = scalar(graph, value.only) / scalar(graph, slope(graph, value.only, place.only))
+            change = slope(graph, value.only, place.only) or graph.const(0.0)
+            step = scalar(graph, value.only) / scalar(graph, change)
             near = _ROUNDING * op("maximum", 1.0, op("absolute", place))
             return op("select", op("le", op("absolute", step), near), place - step, root)
 

@@ -61,13 +61,17 @@ def _labelled(compiled: Compiled, conditions: Conditions) -> list[tuple[str, str
             names = [what, *[f"{what}: end of sliding"] * (count - 1)]
         labels += [(node.path, name) for name in names]
     for each in conditions.located:
-        what: str = each.what
-        names = numbered(_WORDS.get(what, what), each.rows)
+        names = numbered(in_words(each.what), each.rows)
         labels += [(each.block, name) for name in names]
     for node in nodes:
         count = count_guards(node)
         labels += [(node.path, name) for name in numbered("guard", count)]
     return labels
+
+
+def in_words(op: str) -> str:
+    """Return what an operation that switches is called."""
+    return _WORDS.get(op, op)
 
 
 def happened(compiled: Compiled, run: Any, j: int = 0) -> EventLog:

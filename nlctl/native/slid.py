@@ -16,6 +16,7 @@ import numpy as np
 
 from ..blocks import block
 from ..errors import CompileError, ParameterError
+from ..expressions.conditions import zigzag
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Graph, Untraceable
 from ..sliding import IdealRelay
@@ -27,14 +28,15 @@ from .diagram.program import count_switching_functions, memory
 from .diagram.schedule import stand_in
 from .equations.blocks import Equations
 from .equations.relays import slide_places
-from .equations.slides import changing_at, of_both_sides
-from .happened import row_labels
+from .equations.slides import changing_at, declared_functions, of_both_sides, others_of
+from .happened import in_words, row_labels
 from .integrate.state import Status
 from .results import Trajectory
 
 _MOST = 24  # conditions of one run that slide
 _NUMBERS = 64  # elements of an array that slide one by one
 _AROUND = 64  # points
+_NEAR = 0.25  # of a step: how far from its jump it is looked at
 _AHEAD = 1e-9  # times the run's length: what comes no further has not slid
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
@@ -94,41 +96,73 @@ class _Around:
         shapes = ((e.size or 1, _AROUND) for e in exprs)
         return np.concatenate([np.zeros((0, _AROUND)), *map(np.broadcast_to, values, shapes)])
 
+    @property
+    def _rows(self) -> dict[int, Expr]:
+        """The switching functions that are numbers, by their rows: declared ones and others."""
+        slides = [node for node in self.compiled.schedule.nodes if node.slide]
+        relays = sum(map(count_switching_functions, slides))
+        first = self.compiled.program.switching
+        rows = declared_functions(self.read.results, first - relays)
+        for one in self.read.conditions.located:
+            if not one.bends and one.function.size is None:
+                rows[first] = one.function
+            first += one.rows
+        return rows
+
     def slides(self) -> list[tuple[Slide, float]]:
         """Return the conditions at which the rates jump, and nothing else does around it."""
-        located = self.read.conditions.located
-        single = [k for k, one in enumerate(located) if not one.bends and one.function.size is None]
-        functions = self.values([located[k].function for k in single])
-        both = [(k, s) for k, s in zip(single, functions, strict=True) if _has_both_signs(s)]
+        rows = self._rows
+        functions = self.values([*rows.values()])
+        both = [(row, s) for row, s in zip(rows, functions, strict=True) if _has_both_signs(s)]
         groups: list[list[tuple[int, np.ndarray]]] = []
-        for k, s in both:
+        for row, s in both:
             alike = next((g for g in groups if _changes_with(g[0][1], s)), None)
             if alike is None:
-                groups.append([(k, s)])
+                groups.append([(row, s)])
             else:
-                alike.append((k, s))
-        slides = map(self._slide, groups)
+                alike.append((row, s))
+        slides = [self._slide([row for row, _ in g], [rows[row] for row, _ in g]) for g in groups]
         return [slide for slide in slides if slide is not None]
 
-    def _slide(self, group: Sequence[tuple[int, np.ndarray]]) -> tuple[Slide, float] | None:
+    def _slide(self, rows: Sequence[int], functions: list[Expr]) -> tuple[Slide, float] | None:
         """Return a slide of conditions that change together, if rates jump there as it has them."""
-        located, s = self.read.conditions.located, group[0][1]
         every = [e for name in self.read.results for e, _ in self.read.pieces(name)]
         every += [e for part in self.read.fixed_points.values() for e in part]
-        changing = changing_at(self.graph, every, [located[k].function for k, _ in group])
-        sides = [_sides(values, s) for values in self.values(changing)]
-        if None in sides:
+        changing = changing_at(self.graph, every, functions)
+        values = self.values(changing)
+        steps = {zigzag(self.graph, n) for n, v in zip(changing, values, strict=True) if np.ptp(v)}
+        if len(steps) != 1:  # different ones, or steps and what compares
             return None
-        sides = tuple(one for one in sides if one)
+        (step,) = steps
+        (s,) = self.values([step or functions[0]])
+        others = [others_of(self.graph, node, functions) for node in changing]
+        ways = [np.ones(1) if e is None else self.values([e])[0] for e in others]
+        sides = tuple(side for v, w in zip(values, ways, strict=True) if (side := _sides(v, s, w)))
+        if len(sides) < len(values) or (step is not None and np.abs(s).max() > _NEAR):
+            return None
         rates = [e for name in ("dx", "y") for e, _ in self.read.pieces(name)]
-        both = of_both_sides(self.graph, rates, changing, sides)
+        both = of_both_sides(self.graph, rates, changing, sides, functions)
         now, below, above = map(self.values, (rates, *both))
         if np.array_equal(below, above) or not np.array_equal(now, np.where(s < 0.0, below, above)):
             return None
-        labels = row_labels(self.compiled, self.read.conditions)
-        row = self.compiled.program.switching + sum(one.rows for one in located[: group[0][0]])
-        slide = Slide(what=labels[row], places=tuple(k for k, _ in group), sides=sides)
+        first = self.compiled.program.switching
+        block, _ = row_labels(self.compiled, self.read.conditions)[rows[0]]
+        op = next(n.op for n, (a, b) in zip(changing, sides, strict=True) if a != b)
+        slide = Slide(
+            what=(block, in_words(op)),
+            places=self._places([row - first for row in rows if row >= first]),
+            declared=tuple(row for row in rows if row < first),
+            sides=sides, integers=step is not None,
+        )  # fmt: skip
         return slide, float(np.abs(s).max())
+
+    def _places(self, rows: Sequence[int]) -> tuple[int, ...]:
+        """Return the places of located conditions, of integers those of even and of odd ones."""
+        located = self.read.conditions.located
+        of_rows = [k for k, one in enumerate(located) for _ in range(one.rows)]
+        places = {of_rows[row] for row in rows}
+        places |= {k + located[k].integers for k in places}
+        return tuple(sorted(places, key=lambda k: (-located[k].integers, k)))
 
 
 def _has_both_signs(s: np.ndarray) -> bool:
@@ -140,10 +174,14 @@ def _changes_with(one: np.ndarray, other: np.ndarray) -> bool:
     return abs(int(np.sum(np.sign(one) * np.sign(other)))) == one.size
 
 
-def _sides(values: np.ndarray, s: np.ndarray) -> tuple[float, float] | None:
+def _sides(values: np.ndarray, s: np.ndarray, way: np.ndarray) -> tuple[float, float] | None:
     """Return the one value that a comparison has below, and that above; None if it has several."""
+    # as they are where its way is above 0
     below, above = np.unique(values[s < 0.0]), np.unique(values[s > 0.0])
-    return (float(below[0]), float(above[0])) if below.size == above.size == 1 else None
+    if not below.size == above.size == 1 or not (np.all(way > 0.0) or np.all(way < 0.0)):
+        return None
+    sides = float(below[0]), float(above[0])
+    return sides if way.min() > 0.0 else sides[::-1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,8 +269,8 @@ def _in_numbers(compiled: Compiled) -> Compiled:
 
 def _counted(slide: Slide, before: Sequence[tuple[Slide, float]]) -> Slide:
     """Return a slide with places among all conditions, of one among those that were left."""
-    gone = {place for one, _ in before for place in one.places}
-    every = [k for k in range(max(slide.places) + len(gone) + 1) if k not in gone]
+    gone = {place for one, _ in before if not one.integers for place in one.places}
+    every = [k for k in range(max(slide.places, default=0) + len(gone) + 1) if k not in gone]
     return replace(slide, places=tuple(every[place] for place in slide.places))
 
 
@@ -272,7 +310,7 @@ def _read_with(compiled: Compiled, slides: tuple[Slide, ...]) -> Slid:
 
 def _relay(slide: Slide, state: int) -> Node:
     """Return an ideal relay that stands for a condition, and has no signals."""
-    name = f"{slide.what[0]}_slides"
+    name = f"{slide.what[0].replace('.', '_')}_slides"  # names have no dots, paths do
     return Node(
         path=slide.what[0], system=block(IdealRelay(), name), state_offset=state, inputs=({},),
         direct=np.zeros((1, 1), dtype=bool), slide=slide,

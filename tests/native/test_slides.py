@@ -1,5 +1,7 @@
 """Runs along conditions of plain functions, against closed forms and smoothed equations."""
 
+import math
+
 import control as ct
 import numpy as np
 import pytest
@@ -252,15 +254,190 @@ def test_event_functions_see_the_states_of_the_diagram():
 @pytest.mark.parametrize(
     "update",
     [
-        lambda t, x, u, p: [0.5 - np.floor(x[0])],  # not a comparison
+        lambda t, x, u, p: [0.5 - x[0] // 0.25, 0.0],  # a remainder, a quotient and a comparison
         lambda t, x, u, p: [x[1], -np.sign(x[0] + x[1] * abs(x[1]) / 2)],  # both rates vanish
     ],
-    ids=["floor", "time optimal"],
+    ids=["//", "time optimal"],
 )
 def test_other_jumps_end_with_the_reason(update):
-    n = 1 if len(update(0, [0.3, 0.0], 0, 0)) == 1 else 2
     with pytest.raises(nlctl.errors.ChatteringError):
-        nlctl.input_output_response(plain(update, n), [0, 4.0], 0, [1.3, 0.0][:n])
+        nlctl.input_output_response(plain(update, 2), [0, 4.0], 0, [1.3, 0.0])
+
+
+def rounded_down(z):
+    return math.floor(z)
+
+
+@pytest.mark.parametrize(
+    ("steps", "first"),
+    [
+        (lambda x: np.floor(4 * x) / 4, 0.25), (lambda x: np.trunc(4 * x) / 4, 0.25),
+        (lambda x: np.ceil(4 * x) / 4 - 0.25, 0.25), (lambda x: int(4 * x) / 4, 0.25),
+        (lambda x: rounded_down(4 * x) / 4, 0.25), (lambda x: round(4 * x) / 4, 0.125),
+        (lambda x: np.rint(4 * x) / 4, 0.125), (lambda x: np.round(x * 1.6, 1) / 1.6, 0.03125),
+    ],
+)  # fmt: skip
+def test_a_run_slides_along_steps(steps, first):
+    """x' = 1/3 - steps(x) from 0: it passes a level with what is left, and stays at the next."""
+    step = 0.25 if first > 0.1 else 0.0625
+    rates = 1 / 3 - step * np.arange(int(1 / 3 / step) + 1)
+    levels = first + step * np.arange(rates.size)
+    meets = np.cumsum(np.diff(levels, prepend=0.0) / rates)
+    times = np.array([0.0, *meets[:-1], 2 * meets[-1]])
+    run = nlctl.input_output_response(
+        plain(lambda t, x, u, p: [1 / 3 - steps(x[0])], 1), times, 0, 0.0
+    )
+    assert run.states[0] == pytest.approx([0.0, *levels], abs=1e-8)
+    assert len(run.statistics.slides) == 1
+    events = run.events[run.events["time"] > 0]  # floor is at a level where it begins
+    jumps = events[~events["which"].str.contains("end")]
+    assert jumps["time"].to_numpy() == pytest.approx(meets, abs=1e-6)
+
+
+def test_a_level_is_left_where_the_next_one_is_called_for():
+    """x' = 0.35 t - 0.5 n with n = floor(2 x + 1/2): it slides once, and passes all others."""
+    rate = 0.35
+    times = np.linspace(0, 10, 41)
+    meets = np.sqrt(0.5 / rate)  # x = 1/4 = rate t^2 / 2
+    expected = np.where(times < meets, rate / 2 * times**2, 0.25)
+    level, left = 0.25, 0.5 / rate  # where x' = 0 with n = 1
+    pieces = [(left, level, 1)]
+    while pieces[-1][0] < 10:
+        begin, level, n = pieces[-1]
+        slope = rate * begin - 0.5 * n
+        pieces.append(
+            (begin + (np.sqrt(slope**2 + rate) - slope) / rate, level + 0.5, n + 1)
+        )  # fmt: skip
+    for begin, level, n in pieces:
+        since = np.maximum(times - begin, 0.0)
+        x = level + (rate * begin - 0.5 * n) * since + rate / 2 * since**2
+        expected = np.where(times >= begin, x, expected)
+    run = nlctl.input_output_response(
+        plain(lambda t, x, u, p: [rate * t - 0.5 * np.floor(2 * x[0] + 0.5)], 1), times, 0, 0.0,
+        rtol=1e-9, atol=1e-12,
+    )  # fmt: skip
+    assert run.states[0] == pytest.approx(expected, abs=1e-9)
+    assert run.events["time"].to_numpy() == pytest.approx(
+        [meets, left, *(begin for begin, _, _ in pieces[1:-1])], abs=1e-7
+    )
+
+
+def test_elements_of_an_array_slide_one_by_one():
+    """v' = c - sign(v), 12 of them: each rests once v0 / (1 - c) s are over, and 3 never do."""
+    c, start = np.linspace(-0.6, 1.3, 12), np.linspace(0.4, 2.0, 12)
+    times = np.linspace(0, 6, 31)
+    run = nlctl.input_output_response(plain(lambda t, x, u, p: c - np.sign(x), 12), times, 0, start)
+    v = start[:, None] + (c - 1)[:, None] * times
+    assert run.states == pytest.approx(np.where(c[:, None] < 1, np.maximum(v, 0), v), abs=1e-8)
+    rests = (c < 1) & (start / (1 - c) < 6)
+    assert sum(name.startswith("sign") for name in run.statistics.slides) >= rests.sum()
+    assert f"along {len(run.statistics.slides)} x sign of block 'plant'" in str(run)
+
+
+def chain(count, sign):
+    """Masses on springs with dry friction, of which the first one is shaken."""
+
+    def update(t, x, u, params):
+        q, v = x[:count], x[count:]
+        stretched = 3.0 * np.diff(q)
+        force = np.concatenate([[np.sin(t) * (2 + 0.5 * count)], np.zeros(count - 1)])
+        force = force + np.concatenate([stretched, [0.0]]) - np.concatenate([[0.0], stretched])
+        return np.concatenate([v, force - 0.4 * sign(v) - 0.05 * v])
+
+    return update
+
+
+def test_ten_masses_with_friction():
+    times = np.linspace(0, 12, 13)
+    run = nlctl.input_output_response(plain(chain(10, np.sign), 20), times, 0, 0)
+    smooth = chain(10, lambda v: np.clip(v / 1e-5, -1, 1))
+    expected = solve_ivp(lambda t, x: smooth(t, x, 0, 0), [0, 12], np.zeros(20), "Radau", times,
+                         rtol=1e-6, atol=1e-8, max_step=0.05)  # fmt: skip
+    assert run.states == pytest.approx(expected.y, abs=2e-4)
+    assert len(run.statistics.slides) == 10
+
+
+def friction(law, held):
+    """A mass of 1 kg that a force pushes, with a law of friction."""
+    mass = ct.nlsys(
+        lambda t, x, u, p: [held - u[0]], lambda t, x, u, p: x[0], states=1, inputs=["force"],
+        outputs=["velocity"], name="mass",
+    )  # fmt: skip
+    return nlctl.interconnect({"friction": nlctl.block(law, "friction"), "mass": mass})
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        nlctl.actuators.Coulomb(F_c=1.0, sigma_2=0.0),
+        nlctl.actuators.Stribeck(F_c=1.0, F_s=1.0, sigma_2=0.0),
+    ],
+    ids=["Coulomb", "Stribeck"],
+)
+def test_what_blocks_declare_slides_as_well(law):
+    """v' = 1/2 - F from 1: at rest after 2 s."""
+    times = np.linspace(0, 5, 21)
+    run = nlctl.input_output_response(friction(law, 0.5), times, 0, [1.0])
+    assert run.states[0] == pytest.approx(np.maximum(1 - times / 2, 0), abs=1e-8)
+    assert run.statistics.slides == ("sign of block 'friction'",)
+
+
+def test_what_stands_in_a_diagram_within_another_slides():
+    inner = nlctl.interconnect(
+        {"friction": nlctl.block(nlctl.actuators.Coulomb(F_c=1.0, sigma_2=0.0), "friction")},
+        inputs=["velocity"], outputs=["force"], name="contact",
+    )  # fmt: skip
+    mass = ct.nlsys(
+        lambda t, x, u, p: [0.5 - u[0]], lambda t, x, u, p: x[0], states=1, inputs=["force"],
+        outputs=["velocity"], name="mass",
+    )  # fmt: skip
+    times = np.linspace(0, 5, 21)
+    run = nlctl.input_output_response(nlctl.interconnect([inner, mass]), times, 0, [1.0])
+    assert run.states[0] == pytest.approx(np.maximum(1 - times / 2, 0), abs=1e-8)
+    assert run.statistics.slides == ("sign of block 'contact.friction'",)
+
+
+def test_a_product_compares_otherwise_behind_a_zero_of_its_other_factor():
+    """x rests at 0 from 1/2 s on, above it for 0.6 of the time: x (y - 1) > 0 for 0.4, then 0.6."""
+
+    def update(t, x, u, params):
+        across = 1.0 if x[0] * (x[1] - 1.0) > 0 else 0.0
+        return [0.2 - np.sign(x[0]), 1.0, across + (2.0 if x[1] > 1.0 else 0.0)]
+
+    run = nlctl.input_output_response(plain(update, 3), [0, 1, 3], 0, [0.4, -0.5, 0.0])
+    assert run.states[0] == pytest.approx([0.4, 0.0, 0.0], abs=1e-8)
+    assert run.states[2] == pytest.approx([0.0, 0.2, 0.4 + 1.5 * 2.6], abs=1e-7)  # y = 1 at 3/2 s
+
+
+def test_an_inverse_slides():
+    """x' = 1/10 - v with v = x + 1/2 above 0, and x - 1/2 below: it comes to 0, and stays."""
+    inverse = nlctl.actuators.DeadZoneInverse(slope_r=1.0, slope_l=1.0, b_r=0.5, b_l=-0.5)
+    (wanted,), (v,) = inverse.inputs, inverse.outputs
+    lag = ct.nlsys(
+        lambda t, x, u, p: [0.1 - u[0]], lambda t, x, u, p: x[0], states=1, inputs=[v],
+        outputs=[wanted], name="lag",
+    )  # fmt: skip
+    loop = nlctl.interconnect({"inverse": nlctl.block(inverse, "inverse"), "lag": lag})
+    times = np.linspace(0, 4, 21)
+    run = nlctl.input_output_response(loop, times, 0, [1.0])
+    assert run.states[0] == pytest.approx(np.maximum(1.4 * np.exp(-times) - 0.4, 0), abs=1e-7)
+
+
+@pytest.mark.slow
+def test_the_paper_s_loop_slides_along_the_levels_of_a_quantiser():
+    """As with ramps of a thousandth of a step instead of jumps, to about that."""
+    times, width = np.linspace(0, 20, 41), 1e-4
+
+    def ramps(t, x, u, params):
+        z = u[0] / 0.5 + 0.5
+        n = np.floor(z + 0.5)
+        return 0.5 * (n - 0.5 + 0.5 * np.clip((z - n) / width, -1, 1))
+
+    smooth = ct.nlsys(None, ramps, inputs=["u"], outputs=["v"], name="actuator")
+    run = nlctl.input_output_response(nlctl.paper.example_1(actuator=nlctl.Quantiser(q=0.5)), times)
+    expected = nlctl.input_output_response(nlctl.paper.example_1(actuator=smooth), times)
+    assert run.statistics.slides == ("floor of block 'actuator'",)
+    assert run.outputs[0] == pytest.approx(expected.outputs[0], abs=2e-3)
 
 
 def test_slide_is_a_truth_value():

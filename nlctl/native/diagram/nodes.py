@@ -18,8 +18,11 @@ class Slide:
 
     what: tuple[str, str]  # block and name of the first
     places: tuple[int, ...]  # of them among the located conditions
+    declared: tuple[int, ...]  # of them among the switching functions that blocks declare
     # of each comparison that changes there, what it is where the first's function is below 0, above
     sides: tuple[tuple[float, float], ...]
+    # whether that is at each integer of something: two conditions, of even ones and of odd ones
+    integers: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,30 +14,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
 from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array
-from ...expressions.conditions import switching_functions
+from ...expressions.conditions import of_zigzag, switching_functions, zigzag
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
 from ..diagram.nodes import Node
 from ..diagram.program import count_switching_functions, memory
 from ..diagram.schedule import Schedule
 from ..sliding.rates import OUTPUTS, Motion, SlidingInput, SlidingRate, sliding_rates
-from .located import Conditions, sign_key
+from .located import Conditions, Located, sign_key
 from .reader import Reader
 from .relays import array_of, kept_of, limits_of, relay_places
 
 _Results = dict[str, list[tuple[int, Tracer]]]
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
-_JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside")
+_JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", "floor", "ceil", "trunc", "rint")
 _BLENDED = ("dx", "g", "y")
 
 
 def changing_at(graph: Graph, exprs: Iterable[Expr], functions: Iterable[Expr]) -> tuple[Expr, ...]:
     """Return the comparisons in expressions that change where switching functions are 0."""
-    keys = {sign_key(function) for function in functions}
+    # What blocks declare may be a product, of which comparisons have the factors.
+    zero, functions = graph.const(0.0), [*functions]
+    factors = (_functions(graph, graph.op("gt", function, zero)) for function in functions)
+    keys = {sign_key(part) for parts in (functions, *factors) for part in parts}
     return tuple(
         node
         for node in needed(exprs)
@@ -53,13 +57,15 @@ def _functions(graph: Graph, node: Expr) -> tuple[Expr, ...]:
 
 
 def of_both_sides(
-    graph: Graph, exprs: Sequence[Expr], changing: Sequence[Expr], sides: Sequence[Sequence[float]],
-    beyond: Expr | None = None,
-) -> tuple[list[Expr], list[Expr]]:  # fmt: skip
-    """Return expressions as they are below and above, next to where a switching function is 0."""
-    # With the function (`beyond`) also farther away, and each continued on the other side.
+    graph: Graph,
+    exprs: Sequence[Expr],
+    changing: Sequence[Expr],
+    sides: Sequence[Sequence[float]],
+    functions: Sequence[Expr],
+) -> tuple[list[Expr], list[Expr]]:
+    """Return expressions as they are where the first switching function is below 0, and above."""
     both = [
-        _continued(graph, node, values, beyond)
+        _on_sides(graph, node, values, functions)
         for node, values in zip(changing, sides, strict=True)
     ]
     below, above = (
@@ -69,26 +75,39 @@ def of_both_sides(
     return below, above
 
 
-def _continued(
-    graph: Graph, node: Expr, values: Sequence[float], beyond: Expr | None
+def _on_sides(
+    graph: Graph, node: Expr, values: Sequence[float], functions: Sequence[Expr]
 ) -> tuple[Expr, Expr]:
-    """Return what a comparison is below and above."""
-    if beyond is None or node.op in _EQUAL or len(_functions(graph, node)) == 1:
-        low, high = (graph.const(bool(v) if node.kind == "b" else float(v)) for v in values)
+    """Return what a comparison is below and above; `values` are those where `others_of` is > 0."""
+    low, high = (graph.const(bool(v) if node.kind == "b" else float(v)) for v in values)
+    if node.op in _EQUAL:
         return low, high
-    if values[0] == values[1]:
+    if values[0] == values[1]:  # it has a factor that changes here, and does not change itself
         return node, node
-    # It switches elsewhere, too: on the other side it is the opposite of what it would be here.
-    opposite = graph.op("not" if node.kind == "b" else "neg", node)
-    ways = (graph.op(side, beyond, graph.const(0.0)) for side in ("gt", "lt"))
-    low, high = (_either(graph, way, opposite, node) for way in ways)
-    return low, high
+    if zigzag(graph, node) is not None:
+        return of_zigzag(graph, node)
+    others = others_of(graph, node, functions)
+    if others is None:
+        return low, high
+    way = graph.op("gt", others, graph.const(0.0))
+    if node.kind == "b":
+        return graph.op("xor", way, high), graph.op("xor", way, low)
+    return graph.op("select", way, low, high), graph.op("select", way, high, low)
 
 
-def _either(graph: Graph, condition: Expr, one: Expr, other: Expr) -> Expr:
-    if one.kind != "b":
-        return graph.op("select", condition, one, other)
-    return graph.op("xor", condition, other)
+def others_of(graph: Graph, node: Expr, functions: Sequence[Expr]) -> Expr | None:
+    """Return what exchanges the sides of a comparison with its own sign; None of nothing."""
+    # A product compares otherwise behind a zero of its other factor.
+    here, first = {sign_key(function) for function in functions}, functions[0]
+    of_node = {sign_key(part): part for part in _functions(graph, node)}
+    of_first = {sign_key(first): first}
+    if of_node.keys().isdisjoint(of_first):
+        size = graph.op("gt", first, graph.const(0.0))
+        of_first = {sign_key(part): part for part in _functions(graph, size)}
+    apart = of_node.keys() ^ of_first.keys()
+    every = of_node | of_first
+    others = [part for key, part in every.items() if key in apart and key not in here]
+    return reduce(lambda a, b: graph.op("mul", a, b), others) if others else None
 
 
 def _folded(graph: Graph, exprs: Sequence[Expr], values: Mapping[Expr, Expr]) -> list[Expr]:
@@ -117,13 +136,14 @@ class _Between:
     leaf: Expr  # what stands for the relay's output, from -1 to 1
     kept: Expr  # its mode: 1 or -1 on a side, 0 where it slides
     function: Expr  # the switching function, the relay's input
+    functions: tuple[Expr, ...]  # all that change their signs with it, as they are in equations
     changing: tuple[Expr, ...]
 
     def blended(self, exprs: Sequence[Expr], v: Expr) -> list[Expr]:
         """Return expressions as they are at a `v` between both sides, next to these."""
         op, half = self.graph.op, self.graph.const(0.5)
         blended = []
-        for a, b in zip(*self._sides(exprs, None), strict=True):
+        for a, b in zip(*self._sides(exprs), strict=True):
             mean, apart = op("mul", half, op("add", a, b)), op("mul", half, op("sub", b, a))
             blended.append(a if a is b else op("add", mean, op("mul", v, apart)))
         return blended
@@ -132,15 +152,25 @@ class _Between:
         """Return expressions as they are on the side that the relay's memory says, or between."""
         op, const = self.graph.op, self.graph.const
         below, above = op("lt", self.kept, const(0.0)), op("gt", self.kept, const(0.0))
-        sides, chosen = self._sides(exprs, self.function), []
+        sides, chosen = self._sides(exprs), []
         for a, b, between in zip(*sides, self.blended(exprs, v), strict=True):
             inner = op("select", above, b, between)
             chosen.append(a if a is b is between else op("select", below, a, inner))
         return chosen
 
-    def _sides(self, exprs: Sequence[Expr], beyond: Expr | None) -> tuple[list[Expr], list[Expr]]:
+    def if_it_slides(self, function: Expr, otherwise: Expr | None = None) -> Expr:
+        """Return a switching function while it slides, and else one that never switches."""
+        const, op = self.graph.const, self.graph.op
+        slides = op("eq", self.kept, const(0.0))
+        return op("select", slides, function, otherwise or const(1.0))
+
+    def unless_it_slides(self, function: Expr) -> Expr:
+        """Return a switching function, and one that never switches while it slides."""
+        return self.if_it_slides(self.graph.const(1.0), function)
+
+    def _sides(self, exprs: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
         sides = self.node.slide.sides if self.node.slide else ()
-        return of_both_sides(self.graph, exprs, self.changing, sides, beyond)
+        return of_both_sides(self.graph, exprs, self.changing, sides, self.functions)
 
 
 def _by_terms(
@@ -201,19 +231,24 @@ def _slides(reader: Reader, results: _Results, conditions: Conditions) -> list[_
     """Return what slides stand for, of those nodes that are slides."""
     graph, first = reader.graph, len(relay_places(reader.blocks))
     every = [*_pieces(results), *(e for part in reader.fixed_points.values() for e in part)]
+    declared = declared_functions(results, sum(map(count_switching_functions, reader.blocks)))
     slides: list[_Between] = []
     for i, node in enumerate(reader.blocks):
         if node.slide is None:
             continue
-        functions = [conditions.located[place].function for place in node.slide.places]
+        functions = [declared[row] for row in node.slide.declared]
+        functions += [conditions.located[place].function for place in node.slide.places]
         changing = changing_at(graph, every, functions)
         if len(changing) != len(node.slide.sides):
             raise CompileError(f"{_who(node)} compares otherwise than where it was seen to jump")
+        function = functions[0]
+        if node.slide.integers:
+            function = next(filter(None, (zigzag(graph, one) for one in changing)), function)
         leaf = graph.leaf(OUTPUTS, first + len(slides), None)
         slides.append(
             _Between(
                 graph=graph, node=node, place=i, leaf=leaf, kept=kept_of(reader, i),
-                function=functions[0], changing=changing,
+                function=function, functions=tuple(functions), changing=changing,
             )
         )  # fmt: skip
     return slides
@@ -279,19 +314,60 @@ def _with_relays(
     for slide, rate in zip(slides, derived, strict=True):
         i, given = slide.place, [slide.function, rate.drift, rate.gain]
         events = reader.events(i, array_of(reader.graph, given))
-        declared[sum(counts[:i])] = events[: counts[i]]
+        declared[sum(counts[:i])] = _declared_by(slide, events[: counts[i]])
         kept[sum(memories[:i])] = events[counts[i] :]
-    gone = {place for slide in slides if slide.node.slide for place in slide.node.slide.places}
+    silent = {row for slide in slides if slide.node.slide for row in slide.node.slide.declared}
     begin, rows = sum(counts), results["g"]
     behind = [array for row, array in rows if row >= begin]
-    stay = [k for k in range(len(behind)) if k not in gone]
-    g = [(row, declared.get(row, array)) for row, array in rows if row < begin]
-    for k in stay:
-        g.append((begin, behind[k]))
-        begin += behind[k].size
-    left = [one for k, one in enumerate(conditions.located) if k not in gone]
+    located = _left(slides, conditions)
+    g = [(row, _silenced(reader.graph, row, array, silent)) for row, array in rows if row < begin]
+    g = [(row, declared.get(row, array)) for row, array in g]
+    moved = {k: one.function for k, one in located.items() if one is not conditions.located[k]}
+    stay = (array_of(reader.graph, [moved[k]]) if k in moved else behind[k] for k in located)
+    for array in (*stay, *behind[len(conditions.located) :]):
+        g.append((begin, array))
+        begin += array.size
     results = results | {"g": g, "m": [(row, kept.get(row, array)) for row, array in results["m"]]}
-    return results, replace(conditions, located=tuple(left))
+    return results, replace(conditions, located=tuple(located.values()))
+
+
+def _left(slides: Sequence[_Between], conditions: Conditions) -> dict[int, Located]:
+    """Return the conditions that are left: those of integers, where nothing slides along them."""
+    left = dict(enumerate(conditions.located))
+    for slide in slides:
+        stands = slide.node.slide
+        for place in stands.places if stands else ():
+            one = left.pop(place)
+            if stands and stands.integers:
+                left[place] = replace(one, function=slide.unless_it_slides(one.function))
+    return dict(sorted(left.items()))
+
+
+def _declared_by(slide: _Between, events: Tracer) -> Tracer:
+    """Return what a relay declares: of integers their conditions say where one is met."""
+    if not (slide.node.slide and slide.node.slide.integers):
+        return events
+    first, *others = events.cells.flat
+    return array_of(slide.graph, [slide.if_it_slides(first), *others])
+
+
+def _silenced(graph: Graph, row: int, array: Tracer, silent: set[int]) -> Tracer:
+    """Return declared functions, with 1 instead of those at which a run slides."""
+    if silent.isdisjoint(range(row, row + array.size)):
+        return array
+    parts = enumerate(array.short().values.flat, row)
+    return array_of(graph, [graph.const(1.0) if k in silent else expr for k, expr in parts])
+
+
+def declared_functions(results: _Results, count: int) -> dict[int, Expr]:
+    """Return the first `count` switching functions, those that are numbers, by their rows."""
+    functions = dict[int, Expr]()
+    for row, array in results["g"]:
+        for expr, size in array.pieces() if row < count else ():
+            if size == 1:
+                functions[row] = expr
+            row += size
+    return functions
 
 
 def _changed(

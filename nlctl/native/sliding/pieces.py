@@ -16,7 +16,7 @@ import numpy as np
 
 from ...expressions.bends import replaced_parts
 from ...expressions.dependence import affine, dependent_nodes
-from ...expressions.derivatives import tangents
+from ...expressions.derivatives import slope
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
@@ -194,8 +194,4 @@ def _sign(expr: Expr) -> tuple[float, frozenset[Expr]] | None:
 def slope_of(graph: Graph, leaf: Expr, solutions: Mapping[str, Sequence[Expr]]) -> LeafDerivative:
     """Return what gives the derivative of an expression by a leaf, None where it is 0."""
 
-    def tangent(expr: Expr) -> Expr | None:
-        one = graph.const(1.0)
-        return tangents(graph, [expr], lambda e: one if e is leaf else None, solutions)[0]
-
-    return tangent
+    return lambda expr: slope(graph, expr, leaf, solutions)
