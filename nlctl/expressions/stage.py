@@ -83,6 +83,7 @@ class Stage:
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
             keywords = (function.__kwdefaults__ or {}).items()
             copy.__kwdefaults__ = {k: self.instead(v) for k, v in keywords}
+            vars(copy).update({k: self.instead(v) for k, v in vars(function).items()})
             inside = codes_in(function.__code__)
             for name in (name for code in inside for name in code.co_names):
                 if name in function.__globals__:

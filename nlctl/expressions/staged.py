@@ -157,6 +157,8 @@ class StagedObject:
         ):
             getter = attribute.fget if isinstance(attribute, property) else attribute.func
             return stage.copied(getter)(self)
+        if isinstance(attribute, functools._lru_cache_wrapper):
+            return functools.partial(stage.instead(attribute), self)
         of_formula = is_law(real) and name.startswith("_")  # of a family: SciPy's, in Python
         if isinstance(attribute, FunctionType) and (of_formula or not is_of_a_library(real)):
             return functools.partial(stage.copied(attribute), self)

@@ -374,15 +374,16 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                kept = getattr(thing, name, None)  # Python would compute it at the first call
-                self.walk.captured(vars(thing), name, kept)
+                # Python would compute it at the first call
+                self.walk.captured(vars(thing), name, getattr(thing, name, None))
                 return handed_out_again(result)
             return result if not result.own else FRESH
+        if isinstance(entry, functools._lru_cache_wrapper):
+            return made.of_class(self.walk, base, self.walk.captured(type(thing), name, entry).known)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
-            value = getattr(thing, name, UNKNOWN_VALUE)
-            if isinstance(value, Unknown):  # it raises where it runs, if it does
+            if isinstance(value := getattr(thing, name, UNKNOWN_VALUE), Unknown):  # it raises
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and (
                 isinstance(thing, known_calls.WITH_METHODS)
@@ -488,9 +489,8 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     """Whether reading an attribute of an object runs no code that could do anything."""
     if library(type(thing)) is not None or isinstance(thing, type | super):
         return True
-    missing = object()
-    member = inspect.getattr_static(thing, name, missing)
-    if member is missing:
+    member = inspect.getattr_static(thing, name, UNKNOWN_VALUE)
+    if member is UNKNOWN_VALUE:
         return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
     simple = (FunctionType, staticmethod, classmethod)
     return (

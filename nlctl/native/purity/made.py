@@ -10,6 +10,7 @@ import ast
 import collections
 import dataclasses
 import enum
+import functools
 import inspect
 from collections.abc import Callable, Mapping
 from types import FunctionType, ModuleType
@@ -189,7 +190,7 @@ def of_class(walk: Walk, base: KnownValue, member: Callable[..., Any]) -> KnownV
     if isinstance(member, classmethod):
         cls = captured(base.known.cls)
         return KnownValue(True, True, known=Bound(captured(member.__func__), Given((cls,))))
-    if isinstance(member, FunctionType):
+    if isinstance(member, FunctionType | functools._lru_cache_wrapper):
         return KnownValue(True, True, known=Bound(captured(member), Given((base,))))
     return captured(member)
 
