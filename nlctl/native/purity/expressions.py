@@ -171,12 +171,7 @@ class Expressions(ast.NodeVisitor):
                 raise Impure(f"writes into an object of {base.known.cls.__name__}", CHANGES)
             self.walk.function(setter, Given((base, OUTSIDE, value)))
             return
-        setter = inspect.getattr_static(base.known.cls, target.attr, None)
-        if isinstance(setter, property):
-            if setter.fset is not None:
-                self.walk.call(captured(setter.fset), Given((base, value)))
-            return
-        base.known.learn(target.attr, value)
+        made.set_attribute(self.walk, base, captured(target.attr), value)
         self.kept(base, [value])
 
     def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:

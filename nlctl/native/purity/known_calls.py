@@ -361,8 +361,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
     if operator is not None:
         return walk.function(operator, Given(places))
-    if name == "vars" and len(places) == 1:
-        return made.attributes_of(walk, places[0])
+    if (name, len(places)) in made.OF_ATTRIBUTES:
+        return made.OF_ATTRIBUTES[name, len(places)](walk, *places)
     by_key = _by_key(walk, name, given)
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         if name not in _ITERATING or not iterates(walk, value):

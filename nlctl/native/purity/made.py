@@ -17,6 +17,7 @@ from types import FunctionType, ModuleType
 from typing import Any, Generic, NamedTuple, Protocol
 
 from .values import (
+    FRESH,
     OUTSIDE,
     Bound,
     Given,
@@ -36,6 +37,7 @@ from .walk import Walk
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)
+_ANY = ""  # in attributes: what is written under a name that is only known when it runs
 
 
 def instance(walk: Walk, cls: type, given: Given) -> KnownValue:
@@ -140,13 +142,34 @@ def _is_operator(name: str, method: FunctionType) -> bool:
 def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     """Return what is known of an attribute of an object that the call has made."""
     new: Instance = base.known
-    if name in new.attributes:
-        return new.attributes[name]
+    if name == "__dict__":
+        return attributes_of(walk, base)
+    values = [new.attributes[key] for key in dict.fromkeys((name, _ANY)) if key in new.attributes]
     member = inspect.getattr_static(new.cls, name, None)
-    if member is None:
-        return OUTSIDE  # it raises where it runs
+    if name in new.attributes or member is None:
+        return least_upper_bound(values or [OUTSIDE])  # without one it raises where it runs
     walk.captured(new.cls, name, getattr(new.cls, name))
-    return of_class(walk, base, member)
+    result = of_class(walk, base, member)
+    return result if hasattr(type(member), "__get__") else least_upper_bound([result, *values])
+
+
+def set_attribute(
+    walk: Walk, base: KnownValue, name: KnownValue, value: KnownValue
+) -> KnownValue:
+    """Note that an attribute is written, by its name or, where that is open, any of them."""
+    thing = base.known
+    if isinstance(thing, OneOf):
+        return least_upper_bound([set_attribute(walk, c, name, value) for c in thing.choices])
+    if not isinstance(thing, Instance):
+        raise Impure("calls setattr() of what it did not make", "keep it in a state of the block")
+    names = [name.known] if isinstance(name.known, str) else dir(thing.cls)
+    setters = [inspect.getattr_static(thing.cls, n, None) for n in names]
+    for setter in setters:
+        if isinstance(setter, property) and setter.fset is not None:
+            walk.call(captured(setter.fset), Given((base, value)))
+    if len(names) > 1 or not isinstance(setters[0], property):
+        thing.learn(names[0] if isinstance(name.known, str) else _ANY, value)
+    return FRESH
 
 
 def replaced_fields(walk: Walk, base: KnownValue, named: Mapping[str, KnownValue]) -> KnownValue:
@@ -219,6 +242,7 @@ def attributes_of(walk: Walk, value: KnownValue) -> KnownValue:
     """Return what is known of the attributes of an object by their names."""
     thing = value.known
     if isinstance(thing, Instance):
+        thing.learn(_ANY, OUTSIDE)  # whatever is written into it
         return holder(thing.attributes.values())
     if isinstance(thing, Unknown) and value.own and value.holds:
         return dataclasses.replace(value)  # a `SimpleNamespace` that the call has made
@@ -244,3 +268,6 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
         return None
     walk.captured(cls, name, function)
     return function
+
+
+OF_ATTRIBUTES = {("vars", 1): attributes_of, ("setattr", 3): set_attribute}
