@@ -24,6 +24,7 @@ from .values import (
     PLAIN,
     SLICE,
     UNKNOWN_VALUE,
+    Attributes,
     Given,
     Impure,
     Instance,
@@ -176,6 +177,8 @@ class Expressions(ast.NodeVisitor):
 
     def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:
         """Note that a list or dict keeps what the call has not made: any other may be the same."""
+        if isinstance(base.known, Attributes):
+            base.known.of.known.learn(made.OF_DICT, OUTSIDE)
         if base.holds and not all(v.own and v.inside for v in values):
             self.walk.keeps += 1
             self.lists_may_hold_others()
@@ -336,6 +339,8 @@ class Expressions(ast.NodeVisitor):
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
         self.operands([base])
+        if not base.holds and any(isinstance(index, ast.List) for index in indices):
+            return replace(forgotten(base), own=True)  # a copy of these elements
         if any(isinstance(key, slice | type(None)) for key in keys):
             return forgotten(base)  # a view
         if any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):

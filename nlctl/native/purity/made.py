@@ -19,6 +19,7 @@ from typing import Any, Generic, NamedTuple, Protocol
 from .values import (
     FRESH,
     OUTSIDE,
+    Attributes,
     Bound,
     Given,
     Impure,
@@ -29,6 +30,7 @@ from .values import (
     Pure,
     Unknown,
     captured,
+    function_choice,
     holder,
     least_upper_bound,
     library,
@@ -37,7 +39,8 @@ from .walk import Walk
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)
-_ANY = ""  # in attributes: what is written under a name that is only known when it runs
+# in attributes: what is written under a name that is only known when it runs, and by way of a dict
+_ANY, OF_DICT = "", "__dict__"
 
 
 def instance(walk: Walk, cls: type, given: Given) -> KnownValue:
@@ -142,15 +145,17 @@ def _is_operator(name: str, method: FunctionType) -> bool:
 def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     """Return what is known of an attribute of an object that the call has made."""
     new: Instance = base.known
-    if name == "__dict__":
+    if name == OF_DICT:
         return attributes_of(walk, base)
     values = [new.attributes[key] for key in dict.fromkeys((name, _ANY)) if key in new.attributes]
     member = inspect.getattr_static(new.cls, name, None)
     if name in new.attributes or member is None:
         return least_upper_bound(values or [OUTSIDE])  # without one it raises where it runs
     walk.captured(new.cls, name, getattr(new.cls, name))
-    result = of_class(walk, base, member)
-    return result if hasattr(type(member), "__get__") else least_upper_bound([result, *values])
+    result, may_be_method = of_class(walk, base, member), hasattr(type(member), "__get__")
+    if may_be_method:  # nothing but a dict hides one: `set_attribute`
+        values = [new.attributes[OF_DICT]] if OF_DICT in new.attributes else []
+    return least_upper_bound([result, *values])
 
 
 def set_attribute(
@@ -162,13 +167,18 @@ def set_attribute(
         return least_upper_bound([set_attribute(walk, c, name, value) for c in thing.choices])
     if not isinstance(thing, Instance):
         raise Impure("calls setattr() of what it did not make", "keep it in a state of the block")
-    names = [name.known] if isinstance(name.known, str) else dir(thing.cls)
+    is_named = isinstance(name.known, str)
+    if is_named and name.known in ("__dict__", "__class__"):
+        raise Impure(f"writes '{name.known}' of an object", "write its attributes by their names")
+    if not is_named and isinstance(function_choice([value]), OneOf):
+        raise Impure("writes functions into attributes by computed names", "write the names")
+    names = [name.known] if is_named else dir(thing.cls)
     setters = [inspect.getattr_static(thing.cls, n, None) for n in names]
     for setter in setters:
         if isinstance(setter, property) and setter.fset is not None:
             walk.call(captured(setter.fset), Given((base, value)))
-    if len(names) > 1 or not isinstance(setters[0], property):
-        thing.learn(names[0] if isinstance(name.known, str) else _ANY, value)
+    if not is_named or not isinstance(setters[0], property):
+        thing.learn(names[0] if is_named else _ANY, value)
     return FRESH
 
 
@@ -243,7 +253,7 @@ def attributes_of(walk: Walk, value: KnownValue) -> KnownValue:
     thing = value.known
     if isinstance(thing, Instance):
         thing.learn(_ANY, OUTSIDE)  # whatever is written into it
-        return holder(thing.attributes.values())
+        return dataclasses.replace(holder(thing.attributes.values()), known=Attributes(value))
     if isinstance(thing, Unknown) and value.own and value.holds:
         return dataclasses.replace(value)  # a `SimpleNamespace` that the call has made
     if isinstance(thing, Unknown | type | ModuleType) or not hasattr(thing, "__dict__"):

@@ -44,7 +44,7 @@ OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows
               "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 # of builtins that return numbers and texts
 NUMBERS_AND_TEXTS = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float",
-                     "format", "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord",
+                     "format", "hasattr", "int", "isinstance", "issubclass", "len", "ord",
                      "pow", "range", "repr", "round", "slice", "str", "sum", "bytes", "object",
                      "bin", "hex"}  # fmt: skip
 # functions that draw random numbers inside, change settings for everybody, read or write files
