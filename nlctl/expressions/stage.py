@@ -143,7 +143,7 @@ class Stage:
             return self._type(value)
         if type(value) in (list, tuple):
             return type(value)(map(self.instead, value))
-        if type(value) is dict:
+        if type(value) in staged.DICTS:
             parts = {k: self.instead(v) for k, v in value.items()}
             return NumberKeys(parts) if all(isinstance(k, int | float) for k in parts) else parts
         if isinstance(value, BuiltinFunctionType):

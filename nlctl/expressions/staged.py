@@ -7,8 +7,9 @@ import functools
 import inspect
 import itertools
 import logging
+from collections import OrderedDict
 from collections.abc import Callable
-from types import FunctionType, ModuleType
+from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +30,7 @@ from .library.table import (
 )
 from .operators import elementwise
 
+DICTS = (dict, OrderedDict, MappingProxyType)  # whose items are replaced like themselves
 LIBRARIES = ("numpy", "scipy", "numba", "pandas", "json", "re")
 
 
