@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
 from ..decimals import to_decimals
-from ..graph import Expr, Graph, MessageWritten, Namespace, Untraceable, catchable
+from ..graph import Ambiguous, Expr, Graph, MessageWritten, Namespace, Untraceable, catchable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from ..promoted import is_numpys
@@ -183,9 +183,8 @@ class Builtins:
         return getattr(thing, *rest)
 
     def _setattr(self, thing: Any, name: str, value: object) -> None:
-        member = getattr(type(thing), name, None)
-        if isinstance(member, FunctionType):
-            raise Untraceable("setattr() of what is a method")
+        if isinstance(getattr(type(thing), name, None), FunctionType):  # nobody has looked at it
+            raise Ambiguous(f"hides the method {name}() of an object by an attribute")
         setattr(thing, name, value)
 
     def _vars(self, thing: Any) -> Any:

@@ -341,10 +341,9 @@ class Expressions(ast.NodeVisitor):
         self.operands([base])
         if not base.holds and any(isinstance(index, ast.List) for index in indices):
             return replace(forgotten(base), own=True)  # a copy of these elements
-        if any(isinstance(key, slice | type(None)) for key in keys):
-            return forgotten(base)  # a view
-        if any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
-            return forgotten(base)  # it may be one
+        is_view = any(isinstance(key, slice | type(None)) for key in keys)
+        if is_view or any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
+            return forgotten(base)  # or may be one
         whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
         return FRESH if whole else element(base)
 
@@ -379,7 +378,8 @@ class Expressions(ast.NodeVisitor):
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
-            return made.of_class(self.walk, base, self.walk.captured(type(thing), name, entry).known)
+            self.walk.captured(type(thing), name, entry)
+            return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):

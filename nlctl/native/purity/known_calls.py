@@ -170,7 +170,7 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
         raise Message(f"writes messages with {thing.__name__}()", OUTPUT)
     if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
-        if thing.__name__ not in named.OF_TABLES:
+        if thing.__name__ not in named.OF_TABLES or "inplace" in given.names:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
         return OUTSIDE
     cls = type(owner)  # of functions of numbers: splines, polynomials, rotations

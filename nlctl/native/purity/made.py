@@ -158,9 +158,7 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     return least_upper_bound([result, *values])
 
 
-def set_attribute(
-    walk: Walk, base: KnownValue, name: KnownValue, value: KnownValue
-) -> KnownValue:
+def set_attribute(walk: Walk, base: KnownValue, name: KnownValue, value: KnownValue) -> KnownValue:
     """Note that an attribute is written, by its name or, where that is open, any of them."""
     thing = base.known
     if isinstance(thing, OneOf):
