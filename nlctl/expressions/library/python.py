@@ -183,7 +183,7 @@ class Builtins:
         return getattr(thing, *rest)
 
     def _setattr(self, thing: Any, name: str, value: object) -> None:
-        if isinstance(getattr(type(thing), name, None), FunctionType):  # nobody has looked at it
+        if isinstance(getattr(type(thing), name, None), FunctionType):  # it is not walked
             raise Ambiguous(f"hides the method {name}() of an object by an attribute")
         setattr(thing, name, value)
 

@@ -373,8 +373,7 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                # Python would compute it at the first call
-                self.walk.captured(vars(thing), name, getattr(thing, name, None))
+                self.walk.captured(vars(thing), name, getattr(thing, name, None))  # of a first call
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
