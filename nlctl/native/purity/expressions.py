@@ -353,10 +353,9 @@ class Expressions(ast.NodeVisitor):
     def attribute(self, base: KnownValue, name: str) -> KnownValue:
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
-        if isinstance(thing, Unknown):
-            return replace(base, own=base.own and (base.inside or not base.holds))
-        if isinstance(thing, Pure):
-            return replace(base, own=base.inside)
+        if isinstance(thing, Unknown | Pure):
+            is_new = base.own and (base.inside or not base.holds)
+            return replace(base, own=base.inside if isinstance(thing, Pure) else is_new)
         if isinstance(thing, Instance):
             return made.attribute(self.walk, base, name)
         if isinstance(thing, ListOf | RowOf):
