@@ -83,6 +83,7 @@ class Stage:
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
             keywords = (function.__kwdefaults__ or {}).items()
             copy.__kwdefaults__ = {k: self.instead(v) for k, v in keywords}
+            vars(copy).update({k: self.instead(v) for k, v in vars(function).items()})
             inside = codes_in(function.__code__)
             for name in (name for code in inside for name in code.co_names):
                 if name in function.__globals__:
@@ -142,7 +143,7 @@ class Stage:
             return self._type(value)
         if type(value) in (list, tuple):
             return type(value)(map(self.instead, value))
-        if type(value) is dict:
+        if type(value) in staged.DICTS:
             parts = {k: self.instead(v) for k, v in value.items()}
             return NumberKeys(parts) if all(isinstance(k, int | float) for k in parts) else parts
         if isinstance(value, BuiltinFunctionType):

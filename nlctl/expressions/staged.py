@@ -7,8 +7,9 @@ import functools
 import inspect
 import itertools
 import logging
+from collections import OrderedDict
 from collections.abc import Callable
-from types import FunctionType, ModuleType
+from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +30,7 @@ from .library.table import (
 )
 from .operators import elementwise
 
+DICTS = (dict, OrderedDict, MappingProxyType)  # whose items are replaced like themselves
 LIBRARIES = ("numpy", "scipy", "numba", "pandas", "json", "re")
 
 
@@ -157,6 +159,8 @@ class StagedObject:
         ):
             getter = attribute.fget if isinstance(attribute, property) else attribute.func
             return stage.copied(getter)(self)
+        if isinstance(attribute, functools._lru_cache_wrapper):
+            return functools.partial(stage.instead(attribute), self)
         of_formula = is_law(real) and name.startswith("_")  # of a family: SciPy's, in Python
         if isinstance(attribute, FunctionType) and (of_formula or not is_of_a_library(real)):
             return functools.partial(stage.copied(attribute), self)

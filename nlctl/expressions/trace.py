@@ -37,6 +37,7 @@ from .staged import LIBRARIES
 from .staircases import Staircase, check_slopes
 
 PATHS = 128  # paths through one function that are followed
+_STRAIGHT = 10_000  # expressions of a function with few ways through it: equations of robots
 _UNLIKELY = 1e-3  # probability below which something is taken not to be so
 _FEW, _DEEP = 6, 8  # paths, and decisions on one, up to which no branch becomes a choice
 
@@ -81,7 +82,8 @@ def _traced(
     *, merging: bool = False,
 ) -> Tracer:  # fmt: skip
     """Follow every way; with `merging`, branches that only compute numbers are one."""
-    graph.limit = len(graph.nodes) + BUDGET * (1 + merging)  # passes of loops are alike
+    budget = _STRAIGHT if left[0] == _FEW else BUDGET * (1 + merging)  # passes of loops are alike
+    graph.limit = len(graph.nodes) + budget
     assumptions, graph.merges = dict(graph.assumptions), merging
     try:
         stage = Stage(graph, merging=merging)

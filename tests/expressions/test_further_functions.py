@@ -26,6 +26,11 @@ NEWTON = scipy.interpolate.KroghInterpolator([0.0, 1.0, 2.5], [0.0, 1.0, -4.0])
 CURVE = scipy.interpolate.CubicSpline([0.0, 1.0, 2.0], [[0.0, 1.0], [1.0, 0.0], [4.0, 1.0]])
 STEPS = scipy.interpolate.interp1d([0.0, 1.0, 2.0], [[0.0, 1.0], [1.0, 0.0], [4.0, 1.0]], axis=0,
                                    bounds_error=False, fill_value=0.5)  # fmt: skip
+ENDS = scipy.interpolate.interp1d(
+    [0.0, 1.0, 2.0], [[0.0, 1.0, 4.0], [1.0, 0.0, 1.0]], bounds_error=False,
+    fill_value=([-1.0, -2.0], 7.0),
+)  # fmt: skip
+CROSS = np.array([[0.0, 1.0, 0.0], [1.0, -4.0, 1.0], [0.0, 2.0, 0.0]])
 GRID = scipy.interpolate.RegularGridInterpolator(
     ([0.0, 1.0], [0.0, 2.0]), np.arange(4.0).reshape(2, 2), method="nearest",
     bounds_error=False, fill_value=None,
@@ -108,6 +113,9 @@ FUNCTIONS = {
     "Lyapunov": lambda x: scipy.linalg.solve_continuous_lyapunov(
         np.array([[-1.0, 0.2], [0.1 * np.tanh(x[2]), -2.0]]), -np.outer(x[:2], x[:2])
     )[0, 1],
+    "Sylvester": lambda x: scipy.linalg.solve_sylvester(
+        np.diag([1.0, 2.0 + x[0] ** 2]), np.eye(3) + 0.1 * np.outer(x[:3], x[:3]), np.ones((2, 3))
+    )[1, 2],
     "Toeplitz": lambda x: scipy.linalg.toeplitz(x)[1] @ x,
     "roots": lambda x: np.roots([1.0, x[0], -1.0 - x[1] ** 2]).real.max() + x[2],
     "Bessel": lambda x: special.j0(x[0]) + special.jv(-3, x[1]) + special.i1(x[2]),
@@ -124,6 +132,12 @@ FUNCTIONS = {
     "radial": lambda x: RADIAL(x[None, :2])[0],
     "Newton's form": lambda x: NEWTON(x[0]) + NEWTON(x).sum(),
     "a curve": lambda x: CURVE(x[0]) @ x[1:3] + STEPS(x[2])[1],
+    "ends of their own": lambda x: ENDS(x[0]) @ [1.0, 2.0] + ENDS(x)[1, 2],
+    "stencils": lambda x: scipy.ndimage.convolve(x.reshape(2, 2), CROSS, mode="nearest")[0, 1]
+    + scipy.ndimage.laplace(x.reshape(2, 2), mode="wrap")[1, 0],
+    "stencils of signals": lambda x: scipy.signal.convolve2d(
+        x.reshape(2, 2), CROSS, mode="same", boundary="symm"
+    )[0, 1],
     "a grid's nearest": lambda x: GRID((x[0], x[1])),
     "Simpson": lambda x: scipy.integrate.simpson(x, x=[0.0, 1.0, 2.0, 4.0]),
     "filters": lambda x: scipy.signal.lfilter([0.5], [1, -0.5], x)[2]

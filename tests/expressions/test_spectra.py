@@ -6,9 +6,9 @@ from scipy.interpolate import RectBivariateSpline
 
 from nlctl.expressions.arrays import leaf_vector
 from nlctl.expressions.evaluate import evaluate_expressions
-from nlctl.expressions.graph import Graph
+from nlctl.expressions.graph import Graph, Untraceable
 from nlctl.expressions.library.rotated import singular_by_rotations, symmetric_by_rotations
-from nlctl.expressions.library.spectra import eigvals, pinv
+from nlctl.expressions.library.spectra import eigh, eigvals, pinv
 from nlctl.expressions.library.splines import called_object
 
 RNG = np.random.default_rng(3)
@@ -88,3 +88,28 @@ def test_singular_values_by_rotations(shape):
     for a, one in zip(matrices, found, strict=True):
         exact = np.linalg.svd(a, compute_uv=False)
         np.testing.assert_allclose(one.real, exact, rtol=0, atol=2e-14 * (1 + exact[0]))
+
+
+@pytest.mark.parametrize(("dx", "dy"), [(1, 0), (0, 2), (1, 1)])
+def test_derivatives_of_a_surface(dx, dy):
+    """By SciPy's own; of as many orders as it has degrees SciPy raises an error."""
+    x, y = np.linspace(0, 2, 6), np.array([-1.0, -0.4, 0.0, 1.0, 3.0])
+    thing = RectBivariateSpline(x, y, np.sin(np.outer(x, y)))
+    points = list(RNG.uniform((-1, -2), (3, 4), (60, 2)))
+    found = values(lambda g, p: called_object(g, thing, p[0], p[1], dx, dy, False), (2,), points)
+    for p, value in zip(points, found, strict=True):
+        np.testing.assert_allclose(value, thing.ev(*p, dx=dx, dy=dy), rtol=1e-12, atol=1e-13)
+    with pytest.raises(Untraceable, match="orders"):
+        values(lambda g, p: called_object(g, thing, p[0], p[1], 3, 0, False), (2,), points)
+
+
+@pytest.mark.parametrize("half", ["L", "U"])
+def test_eigenvectors_of_two_rows_with_lapacks_signs(half):
+    """Of all signs and sizes, of diagonals, and of multiples of the unit matrix."""
+    matrices = [*RNG.normal(size=(200, 2, 2)) * 10.0 ** RNG.integers(-3, 4, (200, 2, 2))]
+    matrices += [*RNG.integers(-2, 3, (200, 2, 2)).astype(float)]
+    with np.errstate(all="ignore"):
+        every = values(lambda g, a: eigh(g, a, half).eigenvectors, (2, 2), matrices)
+    for a, vectors in zip(matrices, every, strict=True):
+        wanted = np.linalg.eigh(a, half).eigenvectors
+        np.testing.assert_allclose(vectors, wanted, rtol=1e-12, atol=1e-13)

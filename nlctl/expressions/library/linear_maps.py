@@ -15,6 +15,8 @@ from .table import enter, known_numbers
 __all__: list[str] = []
 
 _MOST = 64  # elements of the data
+_OF_GRIDS = ("convolve", "correlate", "laplace", "gaussian_filter", "uniform_filter",
+             "convolve2d", "correlate2d")  # fmt: skip
 
 
 @functools.cache
@@ -24,7 +26,9 @@ def enter_linear_maps() -> None:
 
     for function in (integrate.simpson, signal.savgol_filter, signal.detrend,
                      ndimage.gaussian_filter1d, ndimage.uniform_filter1d, fft.dct, fft.idct,
-                     fft.dst, fft.idst):  # fmt: skip
+                     fft.dst, fft.idst, ndimage.convolve, ndimage.correlate, ndimage.laplace,
+                     ndimage.gaussian_filter, ndimage.uniform_filter, signal.convolve2d,
+                     signal.correlate2d):  # fmt: skip
         enter([function], _by_matrix(function, 0))
     places = {signal.lfilter: 2, signal.filtfilt: 2, signal.sosfilt: 1, signal.sosfiltfilt: 1,
               ndimage.correlate1d: 0, ndimage.convolve1d: 0}  # fmt: skip
@@ -42,12 +46,15 @@ def _by_matrix(function: Callable[..., Any], place: int) -> Callable[..., Any]:
         if len(given) <= place:
             raise Untraceable(f"{function.__name__} with its data by name")
         data = traced(graph, given[place]).short()
-        if data.ndim != 1 or data.size > _MOST or options.get("axis", -1) not in (-1, 0):
+        of_rows = options.get("axis", -1) not in (-1, 0) or function.__name__ not in _OF_GRIDS
+        if data.size > _MOST or (data.ndim != 1 and of_rows):
             raise Untraceable(f"{function.__name__} of something else than a short row")
+        shape, data = data.shape, data.reshape(-1)
 
         def of(values: np.ndarray) -> np.ndarray:
             whole = [v if k == place or v is None or isinstance(v, str) else v[()]
                      for k, v in enumerate(given)]  # fmt: skip
+            values = values.reshape(shape)
             return np.asarray(function(*whole[:place], values, *whole[place + 1 :], **named))
 
         if np.any(of(np.zeros(data.size))):
@@ -57,7 +64,8 @@ def _by_matrix(function: Callable[..., Any], place: int) -> Callable[..., Any]:
         data = data - spread  # what is not finite is in all results
         if not columns[0].shape:
             return _weighed(data, columns)
-        return traced(graph, [_weighed(data, row) for row in columns.T])
+        cells = [_weighed(data, row) for row in columns.reshape(data.size, -1).T]
+        return traced(graph, cells).reshape(columns.shape[1:])
 
     return written
 

@@ -138,15 +138,23 @@ def root_of_matrix(graph: Graph, a: object) -> Tracer:
 
 def lyapunov(graph: Graph, a: object, q: object, discrete: bool = False) -> Any:
     """Return x with a x + x a' = q, or with a x a' - x + q = 0, as one system of equations."""
-    np_, matrix = Facade(graph), traced(graph, a)
-    n = len(matrix)
-    one = traced(graph, np.eye(n))
-    if discrete:
-        whole = traced(graph, np.eye(n * n)) - np_.kron(matrix, matrix)
-    else:
-        whole = np_.kron(matrix, one) + np_.kron(one, matrix)
-    right = traced(graph, q).reshape(-1)
-    known = constant_value(whole)
+    matrix = traced(graph, a)
+    if not discrete:
+        return sylvester(graph, matrix, matrix.T, q)
+    whole = traced(graph, np.eye(len(matrix) ** 2)) - Facade(graph).kron(matrix, matrix)
+    return _unfolded(graph, whole, traced(graph, q))
+
+
+def sylvester(graph: Graph, a: object, b: object, q: object) -> Any:
+    """Return x with a x + x b = q, as one system of equations."""
+    np_, left, right = Facade(graph), traced(graph, a), traced(graph, b)
+    ones = [traced(graph, np.eye(len(m))) for m in (right, left)]
+    whole = np_.kron(left, ones[0]) + np_.kron(ones[1], right.T)
+    return _unfolded(graph, whole, traced(graph, q))
+
+
+def _unfolded(graph: Graph, whole: Any, q: Tracer) -> Any:
+    known, right = constant_value(whole), q.reshape(-1)
     if isinstance(known, np.ndarray):
-        return np_.dot(np.linalg.inv(known), right).reshape(n, n)
-    return solved(graph, whole, right).reshape(n, n)
+        return Facade(graph).dot(np.linalg.inv(known), right).reshape(*q.shape)
+    return solved(graph, whole, right).reshape(*q.shape)

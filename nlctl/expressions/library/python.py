@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
 from ..decimals import to_decimals
-from ..graph import Expr, Graph, MessageWritten, Namespace, Untraceable, catchable
+from ..graph import Ambiguous, Expr, Graph, MessageWritten, Namespace, Untraceable, catchable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from ..promoted import is_numpys
@@ -88,7 +88,8 @@ class Builtins:
         """Return all of them by name."""
         names = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
         names.update(__import__=import_, super=self._super, print=self._print)
-        for name in ("len", "round", "isinstance", "getattr", "hasattr", "type", "vars"):
+        for name in ("len", "round", "isinstance", "getattr", "setattr", "hasattr", "type",
+                     "vars"):  # fmt: skip
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
         names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
@@ -180,6 +181,11 @@ class Builtins:
 
     def _getattr(self, thing: object, *rest: Any) -> Any:
         return getattr(thing, *rest)
+
+    def _setattr(self, thing: Any, name: str, value: object) -> None:
+        if isinstance(getattr(type(thing), name, None), FunctionType):  # it is not walked
+            raise Ambiguous(f"hides the method {name}() of an object by an attribute")
+        setattr(thing, name, value)
 
     def _vars(self, thing: Any) -> Any:
         if not hasattr(type(thing), "_forwards"):

@@ -30,7 +30,7 @@ from .linear_algebra import (
     of_triangle,
     of_triangles,
 )
-from .orthogonal import lyapunov, root_of_matrix, scipys_qr
+from .orthogonal import lyapunov, root_of_matrix, scipys_qr, sylvester
 from .python import guard_whole
 from .reductions import prod
 from .shapes import by_moving
@@ -93,6 +93,7 @@ def _enter_matrices(linalg: Any) -> None:
     enter([linalg.eigh], _scipys_eigh)
     enter([linalg.sqrtm], root_of_matrix)
     enter([linalg.solve_continuous_lyapunov, linalg.solve_lyapunov], lyapunov)
+    enter([linalg.solve_sylvester], sylvester)
     enter([linalg.solve_discrete_lyapunov], lambda graph, a, q: lyapunov(graph, a, q, True))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -61,6 +63,7 @@ def eigvals(graph: Graph, a: object) -> Any:
 
 
 of(np.linalg.qr)(qr)
+_ROUNDING, _SMALLEST = np.finfo(float).eps / 2, np.finfo(float).tiny
 _WITHOUT_SIGN = "singular vectors, or eigenvectors, whose signs are a question of the machine"
 
 
@@ -138,10 +141,49 @@ def eigvalsh(graph: Graph, a: object, UPLO: str = "L") -> Tracer:
 
 @of(np.linalg.eigh)
 def eigh(graph: Graph, a: object, UPLO: str = "L") -> Any:
-    """Return the eigenvalues of a symmetric matrix, and nothing of its vectors."""
-    values, vectors = eigvalsh(graph, a, UPLO), NotComputed(_WITHOUT_SIGN)
+    """Return the eigenvalues of a symmetric matrix, and of two rows the vectors, too."""
+    values, matrix = eigvalsh(graph, a, UPLO), _matrix(graph, a)
+    vectors: Any = NotComputed(_WITHOUT_SIGN)
+    if matrix.shape == (2, 2) and _has_these_signs():
+        vectors = traced(graph, _directions(Facade(graph), *_halves(matrix, UPLO)))
     pair: Any = type(np.linalg.eigh(np.eye(1)))
     return pair(values, vectors)
+
+
+def _halves(matrix: Any, side: str) -> tuple[Any, Any, Any]:
+    return matrix[0, 0], matrix[1, 0] if side == "L" else matrix[0, 1], matrix[1, 1]
+
+
+def _directions(np_: Any, a: Any, b: Any, c: Any) -> list[list[Any]]:
+    """Return the eigenvectors of [[a, b], [b, c]] as columns, with the signs of LAPACK's DLAEV2."""
+    apart, twice = a - c, b + b
+    root = np_.hypot(apart, twice)
+    longer = np_.where(apart >= 0.0, apart + root, apart - root)
+    steep = np_.abs(longer) > np_.abs(twice)
+    ratio = np_.where(steep, -twice, -longer) / np_.where(
+        steep, longer, np_.where(twice == 0.0, 1.0, twice)
+    )
+    size = np_.abs(a) + np_.abs(b) + np_.abs(c)
+    scaled = (size > 1e146) | ((size < 1e-120) & (size > 0.0))  # by LAPACK, which rounds then
+    one = np_.where(scaled, np.nan, 1.0 / np_.hypot(1.0, ratio))
+    cosine, sine = np_.where(steep, ratio * one, one), np_.where(steep, one, ratio * one)
+    alike = np_.equal(a + c >= 0.0, apart >= 0.0)
+    cosine, sine = np_.where(alike, -sine, cosine), np_.where(alike, cosine, sine)
+    apart_already = b * b <= _ROUNDING**2 * np_.abs(a) * np_.abs(c) + _SMALLEST
+    cosine, sine = np_.where(apart_already, 1.0, cosine), np_.where(apart_already, 0.0, sine)
+    swaps = np_.where(apart_already, c < a, a + c >= 0.0)
+    return [[np_.where(swaps, -sine, cosine), np_.where(swaps, cosine, -sine)],
+            [np_.where(swaps, cosine, sine), np_.where(swaps, sine, cosine)]]  # fmt: skip
+
+
+@functools.cache
+def _has_these_signs() -> bool:
+    """Whether this machine's LAPACK gives eigenvectors these signs: others may have theirs."""
+    cases = itertools.product((-2.0, 0.0, 1.0, 3.0), (-1.5, 0.0, 0.5), (-2.0, 0.0, 1.0, 5.0))
+    return all(
+        np.allclose(np.linalg.eigh([[a, 0.0], [b, c]])[1], _directions(np, a, b, c), rtol=1e-12)
+        for a, b, c in cases
+    )
 
 
 @of(np.roots)

@@ -244,14 +244,15 @@ def table_of_one(graph: Graph, interpolant: Any, x: Arithmetic) -> Any:
 
 def _of_columns(interpolant: Any, values: np.ndarray) -> list[Any]:
     """Return a table of one value for each column of one of several."""
-    fill = "extrapolate" if interpolant._extrapolate else interpolant.fill_value
-    ends = fill if isinstance(fill, tuple) else (fill,)
-    if not interpolant._extrapolate and any(np.ndim(end) for end in ends):
-        raise Untraceable("a table with several values, and with others for each beyond its ends")
     spline = getattr(interpolant, "_spline", None)
-    kind = interpolant._kind if spline is None else spline.k
-    how = {"kind": kind, "fill_value": fill, "bounds_error": interpolant.bounds_error}
-    return [type(interpolant)(interpolant.x, column, **how) for column in values.T]
+    how = {"kind": interpolant._kind if spline is None else spline.k,
+           "bounds_error": interpolant.bounds_error}  # fmt: skip
+    ends: Any = ["extrapolate"] * values.shape[1]
+    if not interpolant._extrapolate:
+        shape = np.delete(np.shape(interpolant.y), interpolant.axis)
+        ends = zip(*(np.broadcast_to(v, shape).ravel() for v in _fill(interpolant)), strict=True)
+    return [type(interpolant)(interpolant.x, column, fill_value=end, **how)
+            for column, end in zip(values.T, ends, strict=True)]  # fmt: skip
 
 
 _STEPS = ("nearest", "nearest-up", "previous", "next")

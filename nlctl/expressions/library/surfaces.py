@@ -16,10 +16,12 @@ def surface(
     graph: Graph, spline: Any, x: object, y: object, dx: int = 0, dy: int = 0, grid: bool = True
 ) -> Tracer:
     """Return SciPy's spline of two variables; beyond its ends it is what it is there."""
-    if dx or dy or len(spline.tck) != 3:
-        raise Untraceable("a derivative of a spline of two variables")
+    if len(spline.tck) != 3:
+        raise Untraceable("a spline of two variables that SciPy has not fitted")
+    if any(nu >= max(k, 1) for nu, k in zip((dx, dy), spline.degrees, strict=True)):
+        raise Untraceable("a derivative of a spline of as many orders as it has degrees")
     tx, ty, c = (np.asarray(v, dtype=float) for v in spline.tck)
-    axes = [_axis(t, k) for t, k in zip((tx, ty), spline.degrees, strict=True)]
+    axes = [_axis(t, k, nu) for t, k, nu in zip((tx, ty), spline.degrees, (dx, dy), strict=True)]
     coefficients = c.reshape(axes[0][1].shape[0], -1)
     if coefficients.size > MOST_PIECES:
         raise Untraceable("a spline of two variables with too many pieces")
@@ -36,13 +38,14 @@ def surface(
 _Axis = tuple[np.ndarray, np.ndarray]
 
 
-def _axis(knots: np.ndarray, degree: int) -> _Axis:
-    """Return where pieces begin and end, and of each basis function its polynomial in each."""
+def _axis(knots: np.ndarray, degree: int, nu: int) -> _Axis:
+    """Return where pieces begin and end, and of each basis function a derivative in each."""
     from scipy.interpolate import BSpline, PPoly
 
     breaks = np.unique(knots[degree : knots.size - degree])
     count = knots.size - degree - 1
-    whole = [PPoly.from_spline(BSpline(knots, unit, degree)) for unit in np.eye(count)]
+    units = (PPoly.from_spline(BSpline(knots, unit, degree)) for unit in np.eye(count))
+    whole = [unit.derivative(nu) for unit in units]
     kept = [int(np.searchsorted(whole[0].x, b, side="right")) - 1 for b in breaks[:-1]]
     return breaks, np.array([p.c[:, kept].T for p in whole])
 

@@ -69,7 +69,10 @@ def check_pure(function: object, arguments: Sequence[KnownValue]) -> FunctionRea
         error.place = f"{source_file(plain)}, line {plain.__code__.co_firstlineno}"
         raise error
     walk = FunctionWalk()
-    walk.call(captured(function), Given(tuple(arguments)))
+    try:
+        walk.call(captured(function), Given(tuple(arguments)))
+    except RecursionError:
+        raise Impure("calls itself too deeply to be followed", "make it simpler") from None
     return FunctionReading(
         captured=tuple(walk.read.values()), numba_differs=tuple(dict.fromkeys(walk.numba_differs)),
         messages=tuple(walk.messages),

@@ -24,6 +24,7 @@ from .values import (
     PLAIN,
     SLICE,
     UNKNOWN_VALUE,
+    Attributes,
     Given,
     Impure,
     Instance,
@@ -171,16 +172,13 @@ class Expressions(ast.NodeVisitor):
                 raise Impure(f"writes into an object of {base.known.cls.__name__}", CHANGES)
             self.walk.function(setter, Given((base, OUTSIDE, value)))
             return
-        setter = inspect.getattr_static(base.known.cls, target.attr, None)
-        if isinstance(setter, property):
-            if setter.fset is not None:
-                self.walk.call(captured(setter.fset), Given((base, value)))
-            return
-        base.known.learn(target.attr, value)
+        made.set_attribute(self.walk, base, captured(target.attr), value)
         self.kept(base, [value])
 
     def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:
         """Note that a list or dict keeps what the call has not made: any other may be the same."""
+        if isinstance(base.known, Attributes):
+            base.known.of.known.learn(made.OF_DICT, OUTSIDE)
         if base.holds and not all(v.own and v.inside for v in values):
             self.walk.keeps += 1
             self.lists_may_hold_others()
@@ -341,10 +339,11 @@ class Expressions(ast.NodeVisitor):
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
         self.operands([base])
-        if any(isinstance(key, slice | type(None)) for key in keys):
-            return forgotten(base)  # a view
-        if any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
-            return forgotten(base)  # it may be one
+        if not base.holds and any(isinstance(index, ast.List) for index in indices):
+            return replace(forgotten(base), own=True)  # a copy of these elements
+        is_view = any(isinstance(key, slice | type(None)) for key in keys)
+        if is_view or any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
+            return forgotten(base)  # or may be one
         whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
         return FRESH if whole else element(base)
 
@@ -354,10 +353,9 @@ class Expressions(ast.NodeVisitor):
     def attribute(self, base: KnownValue, name: str) -> KnownValue:
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
-        if isinstance(thing, Unknown):
-            return replace(base, own=base.own and (base.inside or not base.holds))
-        if isinstance(thing, Pure):
-            return replace(base, own=base.inside)
+        if isinstance(thing, Unknown | Pure):
+            is_new = base.own and (base.inside or not base.holds)
+            return replace(base, own=base.inside if isinstance(thing, Pure) else is_new)
         if isinstance(thing, Instance):
             return made.attribute(self.walk, base, name)
         if isinstance(thing, ListOf | RowOf):
@@ -374,15 +372,16 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                kept = getattr(thing, name, None)  # Python would compute it at the first call
-                self.walk.captured(vars(thing), name, kept)
+                self.walk.captured(vars(thing), name, getattr(thing, name, None))  # of a first call
                 return handed_out_again(result)
             return result if not result.own else FRESH
+        if isinstance(entry, functools._lru_cache_wrapper):
+            self.walk.captured(type(thing), name, entry)
+            return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
-            value = getattr(thing, name, UNKNOWN_VALUE)
-            if isinstance(value, Unknown):  # it raises where it runs, if it does
+            if isinstance(value := getattr(thing, name, UNKNOWN_VALUE), Unknown):  # it raises
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and (
                 isinstance(thing, known_calls.WITH_METHODS)
@@ -488,9 +487,8 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     """Whether reading an attribute of an object runs no code that could do anything."""
     if library(type(thing)) is not None or isinstance(thing, type | super):
         return True
-    missing = object()
-    member = inspect.getattr_static(thing, name, missing)
-    if member is missing:
+    member = inspect.getattr_static(thing, name, UNKNOWN_VALUE)
+    if member is UNKNOWN_VALUE:
         return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
     simple = (FunctionType, staticmethod, classmethod)
     return (

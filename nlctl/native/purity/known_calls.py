@@ -170,7 +170,7 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
         raise Message(f"writes messages with {thing.__name__}()", OUTPUT)
     if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
-        if thing.__name__ not in named.OF_TABLES:
+        if thing.__name__ not in named.OF_TABLES or "inplace" in given.names:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
         return OUTSIDE
     cls = type(owner)  # of functions of numbers: splines, polynomials, rotations
@@ -361,8 +361,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
     if operator is not None:
         return walk.function(operator, Given(places))
-    if name == "vars" and len(places) == 1:
-        return made.attributes_of(walk, places[0])
+    if (name, len(places)) in made.OF_ATTRIBUTES:
+        return made.OF_ATTRIBUTES[name, len(places)](walk, *places)
     by_key = _by_key(walk, name, given)
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         if name not in _ITERATING or not iterates(walk, value):

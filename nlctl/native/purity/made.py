@@ -10,13 +10,16 @@ import ast
 import collections
 import dataclasses
 import enum
+import functools
 import inspect
 from collections.abc import Callable, Mapping
 from types import FunctionType, ModuleType
 from typing import Any, Generic, NamedTuple, Protocol
 
 from .values import (
+    FRESH,
     OUTSIDE,
+    Attributes,
     Bound,
     Given,
     Impure,
@@ -27,6 +30,7 @@ from .values import (
     Pure,
     Unknown,
     captured,
+    function_choice,
     holder,
     least_upper_bound,
     library,
@@ -35,6 +39,8 @@ from .walk import Walk
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)
+# in attributes: what is written under a name that is only known when it runs, and by way of a dict
+_ANY, OF_DICT = "", "__dict__"
 
 
 def instance(walk: Walk, cls: type, given: Given) -> KnownValue:
@@ -139,13 +145,39 @@ def _is_operator(name: str, method: FunctionType) -> bool:
 def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     """Return what is known of an attribute of an object that the call has made."""
     new: Instance = base.known
-    if name in new.attributes:
-        return new.attributes[name]
+    if name == OF_DICT:
+        return attributes_of(walk, base)
+    values = [new.attributes[key] for key in dict.fromkeys((name, _ANY)) if key in new.attributes]
     member = inspect.getattr_static(new.cls, name, None)
-    if member is None:
-        return OUTSIDE  # it raises where it runs
+    if name in new.attributes or member is None:
+        return least_upper_bound(values or [OUTSIDE])  # without one it raises where it runs
     walk.captured(new.cls, name, getattr(new.cls, name))
-    return of_class(walk, base, member)
+    result, may_be_method = of_class(walk, base, member), hasattr(type(member), "__get__")
+    if may_be_method:  # nothing but a dict hides one: `set_attribute`
+        values = [new.attributes[OF_DICT]] if OF_DICT in new.attributes else []
+    return least_upper_bound([result, *values])
+
+
+def set_attribute(walk: Walk, base: KnownValue, name: KnownValue, value: KnownValue) -> KnownValue:
+    """Note that an attribute is written, by its name or, where that is open, any of them."""
+    thing = base.known
+    if isinstance(thing, OneOf):
+        return least_upper_bound([set_attribute(walk, c, name, value) for c in thing.choices])
+    if not isinstance(thing, Instance):
+        raise Impure("calls setattr() of what it did not make", "keep it in a state of the block")
+    is_named = isinstance(name.known, str)
+    if is_named and name.known in ("__dict__", "__class__"):
+        raise Impure(f"writes '{name.known}' of an object", "write its attributes by their names")
+    if not is_named and isinstance(function_choice([value]), OneOf):
+        raise Impure("writes functions into attributes by computed names", "write the names")
+    names = [name.known] if is_named else dir(thing.cls)
+    setters = [inspect.getattr_static(thing.cls, n, None) for n in names]
+    for setter in setters:
+        if isinstance(setter, property) and setter.fset is not None:
+            walk.call(captured(setter.fset), Given((base, value)))
+    if not is_named or not isinstance(setters[0], property):
+        thing.learn(names[0] if is_named else _ANY, value)
+    return FRESH
 
 
 def replaced_fields(walk: Walk, base: KnownValue, named: Mapping[str, KnownValue]) -> KnownValue:
@@ -189,7 +221,7 @@ def of_class(walk: Walk, base: KnownValue, member: Callable[..., Any]) -> KnownV
     if isinstance(member, classmethod):
         cls = captured(base.known.cls)
         return KnownValue(True, True, known=Bound(captured(member.__func__), Given((cls,))))
-    if isinstance(member, FunctionType):
+    if isinstance(member, FunctionType | functools._lru_cache_wrapper):
         return KnownValue(True, True, known=Bound(captured(member), Given((base,))))
     return captured(member)
 
@@ -218,7 +250,8 @@ def attributes_of(walk: Walk, value: KnownValue) -> KnownValue:
     """Return what is known of the attributes of an object by their names."""
     thing = value.known
     if isinstance(thing, Instance):
-        return holder(thing.attributes.values())
+        thing.learn(_ANY, OUTSIDE)  # whatever is written into it
+        return dataclasses.replace(holder(thing.attributes.values()), known=Attributes(value))
     if isinstance(thing, Unknown) and value.own and value.holds:
         return dataclasses.replace(value)  # a `SimpleNamespace` that the call has made
     if isinstance(thing, Unknown | type | ModuleType) or not hasattr(thing, "__dict__"):
@@ -243,3 +276,6 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
         return None
     walk.captured(cls, name, function)
     return function
+
+
+OF_ATTRIBUTES = {("vars", 1): attributes_of, ("setattr", 3): set_attribute}

@@ -41,10 +41,12 @@ OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_z
 OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "logsf", "ppf", "pmf", "logpmf", "isf", "mean",
            "std", "var", "median", "moment", "entropy", "interval", "support")  # fmt: skip
 OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
-              "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
+             "keys", "max", "min", "mean", "sum", "head", "tail", "squeeze", "copy",
+             "std", "var", "median", "quantile", "idxmax", "idxmin", "set_index", "reindex",
+             "asof")  # fmt: skip
 # of builtins that return numbers and texts
 NUMBERS_AND_TEXTS = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float",
-                     "format", "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord",
+                     "format", "hasattr", "int", "isinstance", "issubclass", "len", "ord",
                      "pow", "range", "repr", "round", "slice", "str", "sum", "bytes", "object",
                      "bin", "hex"}  # fmt: skip
 # functions that draw random numbers inside, change settings for everybody, read or write files

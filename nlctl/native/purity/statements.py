@@ -116,6 +116,13 @@ class CallWalker(Expressions):
             self.kept(value, [added])
             return
         base = self.visit(node.target.value)
+        if (
+            isinstance(node.target, ast.Attribute)
+            and isinstance(base.known, Instance)
+            and not self.attribute(base, node.target.attr).own
+        ):
+            text = ast.unparse(node.target)
+            raise Impure(f"changes '{text}' in place, which it did not make", CHANGES)
         if base.holds and not base.inside:
             text = ast.unparse(node.target.value)
             raise Impure(f"changes an element of '{text}'", f"{MEMORY}, or {CHANGES}")

@@ -18,6 +18,13 @@ class Unknown:
     """Stands for an object that is only known when the function runs."""
 
 
+@dataclass(frozen=True)
+class Attributes(Unknown):
+    """The dict of an object that the call has made: what is written into it is an attribute."""
+
+    of: KnownValue
+
+
 UNKNOWN_VALUE = Unknown()
 ARRAYS = Unknown()  # what holds numbers and arrays alone
 _CHOICES = 64  # functions in a list, beyond which it is too much to follow
@@ -164,6 +171,7 @@ class KnownValue:
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
         kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
+        kinds |= Attributes
         known = self.known if isinstance(self.known, kinds) else id(self.known)
         return self.own, self.inside, self.holds, known
 

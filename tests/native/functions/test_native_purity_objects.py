@@ -177,7 +177,80 @@ def adds_to_a_dict_of_functions(t, x, u, p):
     return [laws["b"](x[0])]
 
 
+class Given:
+    """Takes attributes by names that are only known when it runs."""
+
+    array = np.zeros(2)
+
+    def __init__(self, given):
+        for name, value in given.items():
+            setattr(self, name, value)
+
+    def law(self, v):
+        return -v
+
+
+class Cached:
+    """A method that remembers, and says so."""
+
+    asked = 0.0
+
+    @functools.cache  # noqa: B019
+    def law(self, v):
+        self.asked += v
+        return [self.asked]
+
+
+CACHED = Cached()
+HIDES = {"law": noting, "gain": 1.0}
+KEPT = {"array": np.zeros(2)}
+
+
+def changes_what_it_was_given_by_name(t, x, u, p):
+    g = Given(KEPT)
+    g.array[0] += x[0]
+    return [g.array[0]]
+
+
+def changes_what_its_class_has(t, x, u, p):
+    g = Given({})
+    g.array += x[0]
+    return [Given.array[0]]
+
+
+def hides_a_method_in_a_dict(t, x, u, p):
+    g = Given({})
+    vars(g).update(HIDES)
+    return [g.law(x[0])]
+
+
+def has_another_dict(t, x, u, p):
+    g = Given({})
+    g.__dict__ = HIDES
+    return [g.law(x[0])]
+
+
+def changes_what_a_dict_of_attributes_has(t, x, u, p):
+    g = Given({"array": np.zeros(2)})
+    g.__dict__.update(KEPT)
+    g.array[0] += x[0]
+    return [g.array[0]]
+
+
+def makes_itself_without_end(t, x, u, p):
+    return [Endless({"a": {"a": 1.0}}).a.a * x[0]]
+
+
+class Endless:
+    def __init__(self, given):
+        for name, value in given.items():
+            setattr(self, name, Endless(value) if isinstance(value, dict) else value)
+
+
 CASES = {
+    "method that is hidden": lambda t, x, u, p: [Given(HIDES).law(x[0])],
+    "cached method": lambda t, x, u, p: CACHED.law(1.0),
+    "number of an object": lambda t, x, u, p: [hash(object()) * x[0]],
     "start": lambda t, x, u, p: [Noting(x[0]).x],
     "start of a parent": lambda t, x, u, p: [Heir(x[0]).x],
     "operator": lambda t, x, u, p: [(Sum(x[0]) + Sum(1.0)).x],
@@ -211,7 +284,10 @@ CASES = {
               writes_into_a_polynomial_of_the_caller, writes_into_a_spline,
               sets_an_attribute_of_a_class, takes_out_a_parameter, notes_in_a_handler,
               through_a_loop, by_a_default_factory, changes_a_list_of_functions,
-              adds_to_a_list_of_functions, adds_to_a_dict_of_functions)
+              adds_to_a_list_of_functions, adds_to_a_dict_of_functions,
+              changes_what_it_was_given_by_name, changes_what_its_class_has,
+              hides_a_method_in_a_dict, has_another_dict, changes_what_a_dict_of_attributes_has,
+              makes_itself_without_end)
 }  # fmt: skip
 
 

@@ -11,5 +11,5 @@ for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "element
                "guarded", "caught", "vehicles", "processes", "laws", "lookups",
                "packages", "iterations", "numbers_of_packages", "sums_and_searches",
                "chosen_things", "chosen_rows", "other_words", "aliases", "handed_on",
-               "networks", "by_name", "searches"):  # fmt: skip
+               "networks", "by_name", "searches", "robots"):  # fmt: skip
     importlib.import_module(f"engineers.{_theme}")
