@@ -293,8 +293,8 @@ def compare_command(
     _check_page_options(out, pdf=pdf, open_=open_, force=force)
     same = compare_reports(first, second, rtol=rtol, as_json=json)
     if out is not None:
+        from ..pages.compared import compose_comparison
         from ..report.render import write_report
-        from .compare_page import compose_comparison
 
         comparison = compose_comparison(first, second, out, rtol)
         page = write_report(comparison, out, force=force)
@@ -321,7 +321,7 @@ def write_gallery_of(
 
     Reports of one title are shown over their dates and revisions.
     """
-    from ..pages.trend import trend_figure
+    from ..pages.compared import trend_figure
     from ..report.gallery import write_gallery
     from ..studies.intact.contents import check_page
     from .terminal import check_writable

@@ -44,7 +44,7 @@ def report_study(path: Path, options: PageOptions) -> tuple[Path, Result]:
     runs = rows_again(result, prepared, threads)
     report = study_report(result, runs, command, loop, published)
     if live and prepared is not None:
-        from ..pages.study.live import with_study_live
+        from ..pages.live import with_study_live
 
         report = with_study_live(report, result, prepared, runs, [] if live is True else live)
     report = stamped(report, options)

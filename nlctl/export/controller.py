@@ -17,7 +17,7 @@ from ..names import unknown
 from ..native.floats import with_every_float
 from ..native.lower import Lowered
 from ..sampling.system import Sampled, sampled
-from .records import ExportedController
+from .source import ExportedController
 from .words import c_name, check_written_out, digest, parameter_values
 
 

@@ -12,7 +12,7 @@ from ..annotations import as_annotated
 from ..diagrams import initial_state as state_of
 from ..native.floats import with_every_float
 from . import words
-from .records import ExportedEquations
+from .source import ExportedEquations
 
 
 @as_annotated

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from ..expressions.dependence import reads
 from ..expressions.graph import Expr
 from .branches import bounded
-from .causes import Cause, When, at_once, differ, when_of
-from .directions import Direction, SomeRows
+from .directions import Cause, Direction, SomeRows, When, at_once, differ, when_of
 from .names import StatePlaces
 from .returning import Returning
 from .sides import KeptSides

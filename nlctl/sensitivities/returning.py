@@ -15,8 +15,7 @@ from functools import cached_property
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph
-from .causes import Cause, When, when_of
-from .directions import Direction, SomeRows, Taken
+from .directions import Cause, Direction, SomeRows, Taken, When, when_of
 from .names import StatePlaces
 from .schedule import Sent
 from .source import EquationParts

@@ -122,7 +122,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["premises"],
         ["inequalities"],
         ["lines", "examination"],
-        ["closure", "conclusions", "conservatism", "ledger", "tighten"],
+        ["conclusions", "conservatism", "ledger", "tighten"],
     ],
     "nlctl.analysis.studies": [
         ["sealed", "file"],
@@ -135,7 +135,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["reading"],
         ["intact", "origin"],
         ["folder"],
-        ["run", "plan", "differences", "integrity"],
+        ["run", "plan", "differences"],
         ["replay"],
     ],
     "nlctl.analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
@@ -328,7 +328,7 @@ def test_layout_is_independent_of_python_control():
     for name in geometry[1:]:  # the first is the package, which re-exports
         assert all(within(m, ["nlctl.drawing"]) for m in imports(name))
         assert "import control" not in ast.unparse(MODULES[name])
-    assert len(geometry) > 4
+    assert {"nlctl.drawing.order", "nlctl.drawing.routes"} <= set(geometry)
 
 
 def imported(name):

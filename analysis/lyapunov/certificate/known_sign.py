@@ -33,8 +33,7 @@ from ..loop.checked import NOTHING_SUPPOSED, Supposed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
 from ..proofs import filtered
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
-from ..proofs.result import FROM_STARTS, Row, per_second
-from ..proofs.saved import Content
+from ..proofs.result import FROM_STARTS, Content, Row, per_second
 
 _PROVED_FOR = {
     "reference": (SumOfSines,),

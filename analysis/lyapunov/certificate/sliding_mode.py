@@ -30,8 +30,7 @@ from ..loop.checked import read_checked
 from ..loop.roles import Pieces, has_law
 from ..proofs import filtered
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider
-from ..proofs.result import FROM_STARTS, Row, per_second
-from ..proofs.saved import Content
+from ..proofs.result import FROM_STARTS, Content, Row, per_second
 
 _PIECES: Pieces = {
     "reference": ("yd", ()),

@@ -21,9 +21,17 @@ from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Sides, Starts, read_starts
-from .content import UNREAD_CONTENT, LoopContent, loop_content
 from .plant_form import Acceleration, acceleration, check_chain
-from .roles import Pieces, Roles, check_kind, joined_again, read_roles
+from .roles import (
+    UNREAD_CONTENT,
+    LoopContent,
+    Pieces,
+    Roles,
+    check_kind,
+    joined_again,
+    loop_content,
+    read_roles,
+)
 from .same_loop import check_same, points_around
 
 ADDED = "declared bounds of external inputs, times their gains"

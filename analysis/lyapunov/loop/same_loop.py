@@ -29,7 +29,7 @@ from nlctl.diagrams.points import (
 from nlctl.errors import DiagramError, UsageError
 
 from ...loop_record import array_text, text_key
-from .content import UNREAD_CONTENT, LoopContent, Remembered
+from .roles import UNREAD_CONTENT, LoopContent, Remembered
 
 _Point = tuple[float, np.ndarray]
 _COUNT, SPREADS = 8, (0.03, 0.3, 1.0)  # points of each spread

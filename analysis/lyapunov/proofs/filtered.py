@@ -27,8 +27,17 @@ from ..bounds.sector import quotient_function, range_of_quotient
 from ..loop.checked import ADDED, CheckedLoop, disturbed
 from ..loop.plant_form import Acceleration
 from .kind import ProofOptions, Subject
-from .result import Certificate, Row, per_second, rows_of_split
-from .saved import Content, equation_content, split_content, starts_content, texts
+from .result import (
+    Certificate,
+    Content,
+    Row,
+    equation_content,
+    per_second,
+    rows_of_split,
+    split_content,
+    starts_content,
+    texts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,7 @@ from nlctl.errors import UsageError
 
 from ...report.document import Claim, Section, Table
 from ...robustness.statistics.guarantee import check_iid
-from ...studies.file.asked import Asked
-from ...studies.file.schema import keyed
+from ...studies.file.schema import Asked, keyed
 from ...studies.page.text import without_assumptions
 from ...studies.result import Finding, Result
 

@@ -12,7 +12,7 @@ from typing import Any
 from ...report.document import Figure, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
-from ...studies.file.asked import Varied
+from ...studies.file.schema import Varied
 from ...studies.kinds import KINDS
 from ...studies.page.running import running
 from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions

@@ -19,8 +19,7 @@ from nlctl import errors
 from ...loop_record import array_text, loop_facts, short_key, text_key
 from ...metrics import Metric
 from ..uncertainty.design import Design
-from ..uncertainty.quantity import Uncertain
-from ..uncertainty.space import Space
+from ..uncertainty.space import Space, Uncertain
 from .experiment import Prepared
 
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")

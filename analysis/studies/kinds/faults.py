@@ -28,7 +28,7 @@ from ...robustness.stl.spec import Requirement, violates
 from ...robustness.stl.text import parse_formula
 from ...robustness.stl.violation_time import ViolationTime, violation_time
 from ..build import faults_of
-from ..file.asked import Asked, Flag, Names, Size
+from ..file.schema import Asked, Flag, Names, Size
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_in_words, margin_text

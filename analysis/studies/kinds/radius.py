@@ -10,9 +10,8 @@ from pydantic import Field
 
 from ... import figures as figures
 from ...report.document import Item, captioned
-from ...robustness.search.largest_scale import largest_scale
-from ...robustness.search.radius import robustness_radius
-from ..file.asked import Confidence, Size, Varied, Whole
+from ...robustness.search.radius import largest_scale, robustness_radius
+from ..file.schema import Confidence, Size, Varied, Whole
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows

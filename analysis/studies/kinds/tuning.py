@@ -33,7 +33,7 @@ from ...robustness import (
 )
 from ...robustness.runs.experiment import signals_of_rows
 from ...robustness.statistics.guarantee import rounded_up
-from ..file.asked import Asked, Confidence, Pair, Size, Whole
+from ..file.schema import Asked, Confidence, Pair, Size, Whole
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table

@@ -19,7 +19,7 @@ from ...robustness.search.confirmation import confirm
 from ...robustness.search.evaluation import margins_of
 from ...robustness.search.shrink import shrink
 from ...robustness.search.worst_case import worst_case
-from ..file.asked import Flag, Number, Varied, Whole
+from ..file.schema import Flag, Number, Varied, Whole
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
