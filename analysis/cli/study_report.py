@@ -14,12 +14,11 @@ from ..pages.study.report import study_report
 from ..paper.page.text import PUBLISHED
 from ..report.render import write_report
 from ..studies import Result, load_result, read_study, run
-from ..studies.intact.contents import recorded_page
-from .own_page import live_words
+from ..studies.intact import recorded_page
 from .printing import notify
 from .progress import sweep_bar
 from .studies import run_folder
-from .written_page import PageOptions, stamped
+from .written_page import PageOptions, live_words, stamped
 
 
 def report_study(path: Path, options: PageOptions) -> tuple[Path, Result]:

@@ -27,8 +27,17 @@ from nlctl.wording import counted
 
 from ..intervals.box import Box
 from .bounds.decomposition import Decomposition
-from .bounds.error_bounds import error_bounds, initial_errors, reference_bounds
-from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .bounds.error_bounds import (
+    Gains,
+    alpha_0,
+    alpha_1,
+    error_bounds,
+    final_bound,
+    initial_errors,
+    initial_V,
+    reference_bounds,
+    total_error,
+)
 from .bounds.sector import plant_terms
 from .bounds.weights import Network, network_on_grid
 from .constants import Constants, constants_of

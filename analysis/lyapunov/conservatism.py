@@ -15,7 +15,7 @@ from nlctl.attributes import described_record
 from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
-from .bounds.final_bound import KAPPA
+from .bounds.error_bounds import KAPPA
 from .bounds.weights import Network, tightest_weights
 from .constants import Constants
 from .examination import Examination, examine

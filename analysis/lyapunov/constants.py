@@ -21,7 +21,7 @@ from ..intervals.arithmetic import as_ball
 from ..intervals.box import Box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove, upper
 from .bounds.decomposition import Decomposition, decompose
-from .bounds.final_bound import KAPPA, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .bounds.error_bounds import KAPPA, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import Sector, plant_terms, sector
 from .bounds.weights import approximation_error, network_on_grid, tightest_weights
 from .loop.roles import Parts, read_parts

@@ -11,7 +11,7 @@ from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from ..intervals.box import Box
-from .bounds.final_bound import alpha_1
+from .bounds.error_bounds import alpha_1
 from .constants import Constants, kappa
 from .inequalities import inequalities
 from .loop.instrumented import update_is_declared

@@ -17,7 +17,7 @@ from ..intervals.arithmetic import as_ball
 from ..intervals.box import Box
 from ..intervals.branch_and_bound import enclose, upper
 from .bounds.decomposition import Decomposition
-from .bounds.final_bound import Gains, alpha_0, alpha_1, initial_V, total_error
+from .bounds.error_bounds import Gains, alpha_0, alpha_1, initial_V, total_error
 from .constants import Constants, bound
 from .loop.integral import sharpest
 

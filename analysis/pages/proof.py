@@ -10,8 +10,8 @@ import numpy as np
 from ..lyapunov.ledger import Ledger, Line
 from ..lyapunov.proofs.result import Certificate
 from ..report.document import Item, Paragraph, Section, Table
+from .diagram import own_values
 from .notation import formulas
-from .run import own_values
 
 PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "

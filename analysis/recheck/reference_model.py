@@ -15,9 +15,8 @@ from fractions import Fraction
 from typing import Any
 
 from .content import Record, begins, need, read_rational, read_split, split_text, states_text
-from .digits import exact_text
 from .equations import WrittenEquation, stays
-from .integers import ALL, ZERO, Interval, absolute, sqrt
+from .integers import ALL, ZERO, Interval, absolute, exact_text, sqrt
 
 _MOST, _BITS = 20_000, 20_000  # products of terms, and bits of a coefficient
 SumOfProducts = dict[tuple[Any, ...], Fraction]  # by product: a tuple of pairs (atom, power)

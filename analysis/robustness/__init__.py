@@ -30,8 +30,15 @@ from .statistics.sensitivity import (
     saltelli,
     sobol_indices,
 )
-from .statistics.sequential import SequentialTest, confidence_sequence, decide, sequence_bounds
-from .statistics.verdict import Verdict, bound_verdict, test_verdict
+from .statistics.sequential import (
+    SequentialTest,
+    Verdict,
+    bound_verdict,
+    confidence_sequence,
+    decide,
+    sequence_bounds,
+    test_verdict,
+)
 from .stl.formula import always, eventually, in_band
 from .stl.spec import Requirement, Spec, margin, margins, unfinished_margin
 from .stl.text import parse_formula

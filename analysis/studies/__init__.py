@@ -3,13 +3,12 @@
 from .differences import origin_differences, run_differences
 from .file.errors import Problem, StudyError
 from .file.schema import Asked, Study, Varied, to_toml
-from .file.shipped import shipped
 from .folder import Integrity, load_result, verify
 from .kind import Ground, Kind, Setup, finding_of
 from .kinds import KINDS
 from .plan import Plan, plan
 from .reading.own_kinds import from_toml
-from .reading.parse import StudyFile, read_study
+from .reading.parse import StudyFile, read_study, shipped
 from .replay import Replay, replay, replay_figure
 from .result import Finding, Result
 from .run import run

@@ -36,7 +36,7 @@ from .build import labels, main_design
 from .code.rule import Grant, Reach
 from .file.schema import Study, keyed, study_data
 from .file.toml import read_toml, study_text
-from .intact.contents import (
+from .intact import (
     CONTENTS,
     PAGE_FILES,
     FindingFile,

@@ -2,9 +2,9 @@
 
 `names` looks up of what and by what, `schedule` makes room for them in a diagram's, `source` has
 its equations in parts, `branches` and `sides` are about jumps, `saltation` about derivatives there,
-at `moving_times`, `returning` about jumps that come back through delays, `ends` about memories that
-are touched at theirs, `program` puts all of that together, `response` integrates it, and `missing`
-says where there is no derivative. `gradients` are those of metrics and margins, `fitting` finds
+at `moving_times`, also of jumps that come back through delays, `ends` about memories that are
+touched at theirs, `program` puts all of that together, `response` integrates it, and `missing` says
+where there is no derivative. `gradients` are those of metrics and margins, `fitting` finds
 parameters from data that `measured` reads, and returns what is `fitted`; `tuning` finds gains for
 requirements: `worth` makes its runs, `tuned` is what it returns.
 """

@@ -20,9 +20,8 @@ from functools import cached_property, partial, reduce
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
 from .directions import Direction, SomeRows, Taken, at_once, rows_replaced
-from .moving_times import TimesThatMove
+from .moving_times import Returning, TimesThatMove
 from .names import StatePlaces
-from .returning import Returning
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
 from .turns import DrivenMemories

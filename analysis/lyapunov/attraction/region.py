@@ -24,8 +24,8 @@ from nlctl.wording import counted
 
 from ...intervals.box import Box, face_of_box
 from ...intervals.branch_and_bound import point_text
-from ...intervals.exact_matrices import exact_matrix, is_positive_definite
-from ...recheck.digits import text_above, text_below
+from ...intervals.normal_form import exact_matrix, is_positive_definite
+from ...recheck.integers import text_above, text_below
 from ..convex import at_least, at_most, minimizer, symmetric_basis
 from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult

@@ -27,8 +27,8 @@ from nlctl.upstream.systems import System
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
-from ...recheck.digits import text_above
-from ..bounds.final_bound import alpha_0, alpha_1, initial_V
+from ...recheck.integers import text_above
+from ..bounds.error_bounds import alpha_0, alpha_1, initial_V
 from ..loop.checked import NOTHING_SUPPOSED, Supposed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
 from ..proofs import filtered

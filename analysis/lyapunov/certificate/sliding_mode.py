@@ -24,7 +24,7 @@ from nlctl.controllers import FilteredError, SlidingModeLaw
 from nlctl.references import SumOfSines
 
 from ...intervals.branch_and_bound import upper
-from ...recheck.digits import text_above
+from ...recheck.integers import text_above
 from ..bounds.error_bounds import error_bounds
 from ..loop.checked import read_checked
 from ..loop.roles import Pieces, has_law

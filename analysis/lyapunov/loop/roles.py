@@ -35,7 +35,7 @@ from nlctl.upstream.control_internals import Around
 from nlctl.upstream.systems import System
 
 from ...loop_record import facts_and_unseen, text_key, value_text
-from ..bounds.final_bound import Gains
+from ..bounds.error_bounds import Gains
 
 _MOST = 1024  # checks that are remembered
 _RECORDS = ("spec", "current_spec")

@@ -31,7 +31,7 @@ from nlctl.wording import counted
 
 from ...response_of_loop import own_parameters
 from ..bounds.decomposition import Decomposition
-from ..bounds.final_bound import Gains, alpha_1
+from ..bounds.error_bounds import Gains, alpha_1
 from .instrumented import observed
 from .roles import Parts, declared, read_parts
 from .same_loop import check_same, points_around

@@ -41,8 +41,7 @@ from ...intervals.paths import Undecided
 from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import reference_bounds
 from ..bounds.starts import Sides
-from ..loop.checked import NOTHING_SUPPOSED, CheckedLoop, Supposed, read_checked
-from ..loop.plant_form import on_intervals
+from ..loop.checked import NOTHING_SUPPOSED, CheckedLoop, Supposed, on_intervals, read_checked
 from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, ball, quadratic_form
 

@@ -17,7 +17,7 @@ from nlctl.wording import counted
 
 from ...intervals.normal_form import exact
 from ...intervals.written import operations
-from ...recheck.digits import text_above
+from ...recheck.integers import text_above
 from ..bounds.decomposition import Decomposition
 from ..loop.checked import ADDED
 from ..proofs.result import (

@@ -30,10 +30,10 @@ from ...intervals.normal_form import exact
 from ...intervals.paths import Undecided
 from ...intervals.written import operations
 from ...recheck import FORMAT, Refuted, proved_bounds, recheck, seal_of
-from ...recheck.digits import text_below
+from ...recheck.integers import text_below
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Starts
-from ..loop.plant_form import Acceleration
+from ..loop.checked import Acceleration
 
 Content = dict[str, Any]
 

@@ -14,8 +14,7 @@ from ...report.outline import summary
 from ...report.render import file_hashes
 from ...studies.file.schema import Varied
 from ...studies.kinds import KINDS
-from ...studies.page.running import running
-from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
+from ...studies.page import ASSUMED, assumptions_in, running, without_assumptions
 from ...studies.reading.own_kinds import STAND_IN
 from ...studies.result import LISTED, Finding, Result
 from ...studies.sealed import as_written

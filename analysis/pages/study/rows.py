@@ -14,8 +14,7 @@ from ... import figures as figures
 from ...report.document import History, Item, Paragraph, Table, captioned
 from ...robustness.search.evaluation import margins_of
 from ...robustness.stl.spec import violates
-from ...studies.page.tables import known
-from ...studies.page.text import clipped, margin_in_words, margin_text, status_text, violate
+from ...studies.page import clipped, known, margin_in_words, margin_text, status_text, violate
 from ...studies.result import Result
 from . import text as text
 from .claims import has_ids, refusal

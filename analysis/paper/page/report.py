@@ -10,7 +10,7 @@ import pandas as pd
 
 from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
-from ...recheck.digits import text_above
+from ...recheck.integers import text_above
 from ...report.document import Claim, Figure, Paragraph, Report, Section, captioned
 from ...reproductions.page import model_section, part_sections, report_of
 from ...reproductions.paper import FoundNumber, PaperRun, PaperRuns

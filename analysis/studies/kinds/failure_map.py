@@ -18,7 +18,7 @@ from ...robustness.search.failure_map import boundary, failure_map
 from ...robustness.stl.spec import violates
 from ..file.schema import Asked, Pair, Whole
 from ..kind import Ground, Kind, finding_of
-from ..page.tables import known
+from ..page import known
 from ..result import Finding, Result
 
 _CAPTION = (

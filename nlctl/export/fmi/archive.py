@@ -37,9 +37,8 @@ from ...sliding.relay import SLIDING
 from ...wording import counted
 from ..words import c_name, check_integers, check_written_out, refuse_if_any
 from ..zig import check_zig, zig
-from .records import Happenings, Model
 from .source import sources, token_of
-from .variables import all_variables, is_structured, value_references
+from .variables import Happenings, Model, all_variables, is_structured, value_references
 
 
 @dataclass(frozen=True, kw_only=True)

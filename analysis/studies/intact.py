@@ -22,10 +22,10 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from nlctl.wording import counted
 
-from ...robustness.runs.store import locked, parquet
-from ..file.schema import keyed
-from ..result import Result
-from ..sealed import ANEW, RunFolderError, file_digest, read_json, write_json
+from ..robustness.runs.store import locked, parquet
+from .file.schema import keyed
+from .result import Result
+from .sealed import ANEW, RunFolderError, file_digest, read_json, write_json
 
 _Shape = TypeVar("_Shape", bound=BaseModel)
 
