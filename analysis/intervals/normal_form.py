@@ -241,9 +241,6 @@ def indeterminate(name: str) -> Sum:
     return Sum({frozenset([(Atom(name), 1)]): Fraction(1)})
 
 
-__all__ = ["exact_matrix", "is_positive_definite", "rational"]
-
-
 def rational(x: object) -> fmpq:
     """Return a finite number as a rational one of flint."""
     if isinstance(x, fmpq):

@@ -128,7 +128,8 @@ def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) ->
     for p in reversed(poles):
         previous = rows[0]
         rows.insert(0, [p * a + b for a, b in zip([*previous, 0], [0, *previous], strict=True)])
-    z = [abs(_dot(row, e0)) for row in rows]
+    products = ([a * b for a, b in zip(row, e0, strict=False)] for row in rows)
+    z = [abs(sum(terms, arb(0))) for terms in products]
     z[0] = C
     for k in range(1, n):
         z[k] = z[k].max(z[k - 1] / poles[k - 1])
@@ -144,10 +145,6 @@ def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) ->
     return tuple(
         sum((abs(c) * z[n - 1 - j] for j, c in enumerate(row)), arb(0)) for row in combinations
     )
-
-
-def _dot(row: Sequence[arb], values: Sequence[arb | float]) -> arb:
-    return sum((a * b for a, b in zip(row, values, strict=False)), arb(0))
 
 
 @functools.lru_cache(maxsize=32)

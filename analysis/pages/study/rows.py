@@ -185,13 +185,11 @@ def fan_items(histories: Histories, key: str) -> Iterator[Item]:
         shown=list(both)[: len(runs)],
         bands={}
         if histories.groups
-        else {f"{n}, nominal": _most(y) for n, y in histories.signals.items()},
+        else {  # ends of the band that holds 90 % of the rows at each time
+            f"{n}, nominal": (figures.quantile(y, 0.05, -np.inf), figures.quantile(y, 0.95, np.inf))
+            for n, y in histories.signals.items()
+        },
     )
-
-
-def _most(samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the band that holds 90 % of the rows at each time."""
-    return figures.quantile(samples, 0.05, -np.inf), figures.quantile(samples, 0.95, np.inf)
 
 
 def _bands(kept: Histories) -> str:

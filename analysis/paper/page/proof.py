@@ -211,7 +211,13 @@ def lyapunov_sections(proofs: Mapping[int, Evidence], far: FarRuns = NO_FAR_RUNS
     if not proofs:
         return []
     parts = [section for number, one in proofs.items() for section in _example(number, one)]
-    return [_finding(proofs, far), _lemma(), *parts]
+    lemma = Section(
+        key="proof-lemma",
+        title="Lemma 1: a counterexample, and what remains",
+        level=3,
+        items=[Paragraph(text=words) for words in LEMMA],
+    )
+    return [_finding(proofs, far), lemma, *parts]
 
 
 def _finding(proofs: Mapping[int, Evidence], far: FarRuns) -> Section:
@@ -314,15 +320,6 @@ def _slow_drift_table(proofs: Mapping[int, Evidence]) -> Table:
         caption=f"The drift of ζ, judged after {LOOK:g} s. {SLOW_DRIFT}",
         columns=("loop", "ζ", "budget used", "verdict", "ζ settles at", "burst at"),
         rows=rows,
-    )
-
-
-def _lemma() -> Section:
-    return Section(
-        key="proof-lemma",
-        title="Lemma 1: a counterexample, and what remains",
-        level=3,
-        items=[Paragraph(text=words) for words in LEMMA],
     )
 
 

@@ -29,11 +29,9 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def _listed(value: object) -> Any:
-    return (value,) if isinstance(value, str) else value
-
-
-Ids = Annotated[tuple[Id, ...], BeforeValidator(_listed)]
+Ids = Annotated[
+    tuple[Id, ...], BeforeValidator(lambda given: (given,) if isinstance(given, str) else given)
+]
 
 
 class Asked(Strict):
@@ -143,10 +141,6 @@ class Rule(Strict):
     id: Id = Field("", description="Its id where requirements are kept, such as 'REQ-12'.")
 
 
-def _rule(value: object) -> Any:
-    return {"formula": value} if isinstance(value, str) else value
-
-
 class Times(Strict):
     """When signals are sampled."""
 
@@ -230,7 +224,13 @@ class Study(Strict):
     faults: dict[str, Faulty] = Field(
         {}, description="Signal of the loop -> kinds of faults, for the analysis 'faults'."
     )
-    spec: dict[str, Annotated[Rule, BeforeValidator(_rule)]] = Field(
+    spec: dict[
+        str,
+        Annotated[
+            Rule,
+            BeforeValidator(lambda given: {"formula": given} if isinstance(given, str) else given),
+        ],
+    ] = Field(
         description="Name -> requirement.",
         json_schema_extra={"minProperties": 1},  # `checked_experiment` says so, with all else
     )
