@@ -103,19 +103,7 @@ def as_sum(x: object) -> Any:
 
 
 class Sum(NumPyFunctions):
-    """A sum of products of atoms, as equations compute with it.
-
-    Examples
-    --------
-    A difference that is 0 whatever x is:
-
-    >>> import numpy as np
-    >>> from nlctl.analysis.intervals.normal_form import indeterminate
-    >>> x = indeterminate("x")
-    >>> difference = np.sin(2 * x) * (x + 1) - np.sin(x + x) - x * np.sin(2 * x)
-    >>> len(difference.terms)
-    0
-    """
+    """A sum of products of atoms, as equations compute with it."""
 
     __slots__ = ("partial", "terms")
     rank = 2
@@ -217,27 +205,12 @@ class Sum(NumPyFunctions):
 
 
 def exact(number: Any) -> Fraction:
-    """Return a number as the fraction that it is.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.intervals.normal_form import exact
-    >>> print(exact(0.5))
-    1/2
-    """
+    """Return a number as the fraction that it is."""
     return number if isinstance(number, Fraction) else Fraction(float(number))
 
 
 def indeterminate(name: str) -> Sum:
-    """Return a symbol as a sum, which equations take instead of a number.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.intervals.normal_form import indeterminate
-    >>> x = indeterminate("x")
-    >>> sorted((x * x - x + 1).terms.values())
-    [Fraction(-1, 1), Fraction(1, 1), Fraction(1, 1)]
-    """
+    """Return a symbol as a sum, which equations take instead of a number."""
     return Sum({frozenset([(Atom(name), 1)]): Fraction(1)})
 
 

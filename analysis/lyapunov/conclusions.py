@@ -40,7 +40,7 @@ from .bounds.error_bounds import (
 )
 from .bounds.sector import plant_terms
 from .bounds.weights import Network, network_on_grid
-from .constants import Constants, constants_of
+from .constants import Constants, Premises, constants_of, premises
 from .inequalities import terms
 from .lines import Line
 from .loop.roles import Parts
@@ -48,7 +48,6 @@ from .loop.simulation import MemberRun
 from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, slow_drift
-from .premises import Premises, premises
 
 FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not tried
 STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"

@@ -29,8 +29,7 @@ from .bounds.weights import approximation_error, network_on_grid, tightest_weigh
 from .certificate.gains import GainCandidate, tradeoff
 from .constants import disturbance
 from .examination import U_MAX, Examination, examine
-from .loop.instrumented import observed
-from .loop.integral import sharpest
+from .loop.instrumented import observed, sharpest
 from .loop.roles import Parts, read_parts
 from .loop.signals import signals_of
 from .loop.simulation import SAMPLING_INTERVAL

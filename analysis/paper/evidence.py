@@ -22,6 +22,7 @@ from nlctl.response import input_output_response
 from ..lyapunov.certificate.certify import certify
 from ..lyapunov.certificate.known_sign import KnownSignCertificate
 from ..lyapunov.conservatism import Conservatism, conservatism
+from ..lyapunov.constants import premises
 from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
 from ..lyapunov.inequalities import inequalities, terms
@@ -31,7 +32,6 @@ from ..lyapunov.loop.signals import Margin, signals_of
 from ..lyapunov.nussbaum.energy import finite_signal
 from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LOOKS, LongRun, long_run
 from ..lyapunov.nussbaum.slow_drift import SlowDrift
-from ..lyapunov.premises import premises
 from ..metrics import peak
 from .burst import Burst, through_the_burst
 from .controllers import compared_controllers

@@ -1,7 +1,6 @@
 """Controllers and equations as code for other machines: C99, object code, FMUs."""
 
-from .controller import export_controller
-from .equations import export_equations
+from .controller import export_controller, export_equations
 from .fmi.archive import fmu
 from .objects import TARGETS, Target, object_code
 from .source import ExportedController, ExportedEquations, c_files

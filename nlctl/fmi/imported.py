@@ -16,8 +16,7 @@ from ..equations import equation
 from ..errors import ParameterError, UsageError
 from ..params import param, record
 from ..sampling.system import sampled
-from .described import Described, read_description
-from .running import Running
+from .running import Described, Running, read_description
 
 
 def in_model_exchange(of: Described, running: Running) -> Any:

@@ -11,7 +11,7 @@ import pytest
 from places import ROOT
 
 import nlctl
-from nlctl.analysis.robustness.runs.identity import computing
+from nlctl.analysis.robustness.runs.store import computing
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._version", "nlctl.host", "nlctl.upstream", "nlctl.attributes"],
@@ -119,7 +119,6 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["model_reference", "attraction"],
         ["certificate"],
         ["constants"],
-        ["premises"],
         ["inequalities"],
         ["lines", "examination"],
         ["conclusions", "conservatism", "ledger", "tighten"],

@@ -19,7 +19,7 @@ from nlctl.analysis.lyapunov.loop.signals import equality, inequality
 from nlctl.analysis.lyapunov.nussbaum.long_run import LongRun, long_run
 from nlctl.analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
 from nlctl.analysis.pages import proof as ledger_text
-from nlctl.analysis.pages.notation import formulas
+from nlctl.analysis.pages.proof import formulas
 from nlctl.analysis.paper import BOUND
 from nlctl.analysis.paper.burst import through_the_burst
 from nlctl.analysis.paper.evidence import (

@@ -33,8 +33,7 @@ from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.clipped import clipped_split
 from ..bounds.decomposition import Decomposition, decompose
-from ..loop.checked import disturbed
-from ..loop.same_loop import points_around
+from ..loop.checked import disturbed, points_around
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
 from .decrease import Decrease, Region, decrease, outside_ball, region, sigma_of
 from .matching import (

@@ -10,8 +10,7 @@ from ... import figures
 from ...lyapunov.conservatism import Conservatism
 from ...lyapunov.nussbaum.long_run import LOOKS, LongRun
 from ...lyapunov.nussbaum.slow_drift import SlowDrift
-from ...pages.notation import formulas
-from ...pages.proof import ledger_section
+from ...pages.proof import formulas, ledger_section
 from ...report.document import Figure, Item, Paragraph, Section, Table, captioned
 from ..burst import Burst
 from ..evidence import FAR_HORIZONS, LOOK, NO_FAR_RUNS, Evidence, FarRuns

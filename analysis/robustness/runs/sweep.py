@@ -36,9 +36,8 @@ from nlctl.native.ensemble import cores
 
 from ..uncertainty.design import Design, rows
 from .experiment import Prepared, chunk_table, columns_of
-from .identity import identity_of
 from .progress import Progress, Tally
-from .store import ChunkStore, claimed, opened, put, stored, table_of, taken_up
+from .store import ChunkStore, claimed, identity_of, opened, put, stored, table_of, taken_up
 
 _LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
 Chunk = tuple[range, pd.DataFrame]
