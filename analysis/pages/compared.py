@@ -88,7 +88,7 @@ def comparison_page(
         title=f"Compared: {', and '.join(titles)}",
         question="what does the second report say that the first did not?",
         verdict=_verdict(claims, numbers, pictures, curves),
-        headline=_headline(claims, count, len(pictures)),
+        headline=_headline(claims, count),
         claims=[],
         sections=sections,
         command=command,
@@ -97,7 +97,7 @@ def comparison_page(
     )
 
 
-def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headline:
+def _headline(claims: Sequence[ClaimChange], count: int) -> Headline:
     """Return how the claims changed, or that nothing differs."""
     moved: dict[tuple[str, str], list[ClaimChange]] = {}
     for change in claims:
