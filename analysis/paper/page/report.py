@@ -19,10 +19,9 @@ from .. import figures as histories
 from ..burst import Burst
 from ..evidence import NO_FAR_RUNS, Evidence, FarRuns
 from . import text as text
-from .closing import closing_sections, metric_table, sampling_section
+from .closing import closing_sections, metric_table, rivals_section, sampling_section
 from .proof import lyapunov_sections
 from .record import LV_2017
-from .rivals import rivals_section
 
 PAPER = "the paper"
 ACTUATED = ("1", "2", "1-backlash", "2-dead-zone")  # cases: both examples, both actuators
