@@ -1,4 +1,4 @@
-"""Experiments that parameters are fitted to: what was measured, what the run was given, what fits."""
+"""Experiments that parameters are fitted to: what was measured, what a run was given, what fits."""
 
 from __future__ import annotations
 
