@@ -9,7 +9,6 @@ import ast
 import dataclasses
 import functools
 import importlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -52,12 +51,12 @@ def named_block(name: str) -> type:
 def block_summaries() -> dict[str, dict[str, str]]:
     """Return the first line of each block record's docstring: ``{group: {name: line}}``."""
     # The names are those of `block_records`, in the same order.
-    return {group: _summaries(group, _is_record) for group in _GROUPS}
+    return {group: _summaries(group, ast.ClassDef) for group in _GROUPS}
 
 
 def function_summaries() -> dict[str, dict[str, str]]:
     """Return the first line of each function that makes blocks: ``{group: {name: line}}``."""
-    summaries = {group: _summaries(group, _is_function) for group in _OF_FUNCTIONS}
+    summaries = {group: _summaries(group, ast.FunctionDef) for group in _OF_FUNCTIONS}
     return {group: lines for group, lines in summaries.items() if lines}
 
 
@@ -78,20 +77,13 @@ def making_function(name: str) -> Any:
 
 
 @functools.cache
-def _summaries(group: str, chosen: Callable[[ast.stmt], bool]) -> dict[str, str]:
-    """Return what is chosen of the public names of a module, or of a package and its rooms."""
+def _summaries(group: str, kind: type[ast.ClassDef | ast.FunctionDef]) -> dict[str, str]:
+    """Return the functions or the records of the public names of a module, or a package."""
     summaries = {
         node.name: (ast.get_docstring(node) or "").partition("\n")[0]
         for path in (sorted(Path(NLCTL_FOLDER, group).rglob("*.py")) or [Path(face(group))])
         for node in ast.parse(path.read_bytes()).body
-        if isinstance(node, ast.ClassDef | ast.FunctionDef) and chosen(node)
+        if isinstance(node, kind)
+        if kind is ast.FunctionDef or "record" in map(ast.unparse, node.decorator_list)
     }
     return {name: summaries[name] for name in public_names(group) if name in summaries}
-
-
-def _is_record(node: ast.stmt) -> bool:
-    return isinstance(node, ast.ClassDef) and "record" in map(ast.unparse, node.decorator_list)
-
-
-def _is_function(node: ast.stmt) -> bool:
-    return isinstance(node, ast.FunctionDef)

@@ -33,17 +33,11 @@ _SAME = 1e-4  # of a signal's range
 
 @dataclass(frozen=True, kw_only=True)
 class LoopCheck:
-    """One thing that was checked.
-
-    Attributes
-    ----------
-    what, found : str
-    status : {"pass", "caution", "fail", "not applicable"}
-    """
+    """One thing that was checked."""
 
     what: str
     found: str
-    status: str
+    status: str  # pass, caution, fail, or not applicable
 
 
 def checks_of(loop: object, response: object, params: Mapping[str, Any]) -> list[LoopCheck]:

@@ -28,10 +28,9 @@ from nlctl.wording import counted
 from .loop_record import difference_text, fact_differences, loop_facts
 from .lyapunov.ledger import Ledger
 from .lyapunov.proofs.result import Certificate
-from .pages.diagram import diagram_sections
+from .pages.diagram import diagram_sections, outputs_of_run, run_section
 from .pages.live import behind_figures, live_item, live_numbers, live_program
 from .pages.proof import certificate_section, ledger_section, ledger_text
-from .pages.run import outputs_of_run, run_section
 from .pages.study.claims import claims as study_claims
 from .pages.study.histories import Histories, loop_again, rows_again
 from .pages.study.methods import limits as study_limits
@@ -41,7 +40,7 @@ from .report.document import Claim, Paragraph, Report, Section, versions
 from .response_of_loop import check_response, own_parameters
 from .robustness.stl.spec import Requirement
 from .studies.origin import diagram_differences
-from .studies.page.text import without_assumptions
+from .studies.page import without_assumptions
 from .studies.result import Result
 
 __all__ = ["loop_report"]

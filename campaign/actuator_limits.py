@@ -22,7 +22,7 @@ from page_tables import markdown_table
 
 from nlctl import actuators, native, paper
 from nlctl.analysis.lyapunov.bounds.decomposition import DecompositionError, decompose
-from nlctl.analysis.paper.cases import HORIZON, TAIL
+from nlctl.analysis.paper.reproduction import HORIZON, TAIL
 from nlctl.analysis.paper.rivals import rival_controller, rival_controllers
 from nlctl.analysis.paper.sampling_limits import BAND, meets_the_spec
 from nlctl.analysis.report.svg import svg_files

@@ -16,7 +16,7 @@ import numpy as np
 
 from nlctl import paper
 from nlctl.analysis.lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LOOKS, LongRun, long_run
-from nlctl.analysis.paper.reference_run import AGREE, RECORD
+from nlctl.analysis.paper.evidence import AGREE, RECORD
 
 TOLERANCES = (1e-6, 1e-7)  # relative; the record is of the second
 _WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest

@@ -12,8 +12,6 @@ from nlctl.names import unknown
 
 from .loops import assignments, named_loop
 
-__all__ = ["write_export", "write_fmu"]
-
 
 def write_export(
     loop: str,

@@ -19,8 +19,8 @@ from ..papers import paper_key
 from . import studies, written_page
 from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun, given_tolerances
 from .memory import TO_BEGIN, check_memory
-from .own_page import compose_page, is_loop_name, is_paper_name, page_folder
 from .printing import error_line, in_json, notify, say
+from .written_page import compose_page, is_loop_name, is_paper_name, page_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -293,8 +293,8 @@ def compare_command(
     _check_page_options(out, pdf=pdf, open_=open_, force=force)
     same = compare_reports(first, second, rtol=rtol, as_json=json)
     if out is not None:
+        from ..pages.compared import compose_comparison
         from ..report.render import write_report
-        from .compare_page import compose_comparison
 
         comparison = compose_comparison(first, second, out, rtol)
         page = write_report(comparison, out, force=force)
@@ -321,9 +321,9 @@ def write_gallery_of(
 
     Reports of one title are shown over their dates and revisions.
     """
-    from ..pages.trend import trend_figure
+    from ..pages.compared import trend_figure
     from ..report.gallery import write_gallery
-    from ..studies.intact.contents import check_page
+    from ..studies.intact import check_page
     from .terminal import check_writable
 
     check_writable(folder)
@@ -371,7 +371,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 def _check_run(path: Path) -> None:
     """Refuse a run, or its page, of which something was lost or edited."""
     from ..studies import load_result
-    from ..studies.intact.contents import check_page, is_run
+    from ..studies.intact import check_page, is_run
 
     folder = path if path.is_dir() else path.parent
     has_page = (folder / "report.json").exists()

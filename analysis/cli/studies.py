@@ -236,7 +236,7 @@ def schema() -> None:
 
 def check_study_path(study: Path) -> None:
     """Refuse a folder where a study file is wanted."""
-    from ..studies.intact.contents import is_run
+    from ..studies.intact import is_run
 
     if study.is_dir():
         run = shlex.quote(str(study))

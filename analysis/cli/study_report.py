@@ -14,12 +14,11 @@ from ..pages.study.report import study_report
 from ..paper.page.text import PUBLISHED
 from ..report.render import write_report
 from ..studies import Result, load_result, read_study, run
-from ..studies.intact.contents import recorded_page
-from .own_page import live_words
+from ..studies.intact import recorded_page
 from .printing import notify
 from .progress import sweep_bar
 from .studies import run_folder
-from .written_page import PageOptions, stamped
+from .written_page import PageOptions, live_words, stamped
 
 
 def report_study(path: Path, options: PageOptions) -> tuple[Path, Result]:
@@ -44,7 +43,7 @@ def report_study(path: Path, options: PageOptions) -> tuple[Path, Result]:
     runs = rows_again(result, prepared, threads)
     report = study_report(result, runs, command, loop, published)
     if live and prepared is not None:
-        from ..pages.study.live import with_study_live
+        from ..pages.live import with_study_live
 
         report = with_study_live(report, result, prepared, runs, [] if live is True else live)
     report = stamped(report, options)

@@ -12,19 +12,28 @@ from .proof import (
     story,
     windowed_maximum,
 )
-from .rankings import paired_differences, screening, set_apart, shares, tornado, violation_rates
+from .rankings import (
+    paired_differences,
+    screening,
+    set_apart,
+    shares,
+    tornado,
+    trend,
+    violation_rates,
+)
 from .runs import CLIP, fans, margins_figure, overlaid, running_estimate
 from .searches import (
+    bought,
     degradation,
     deviations,
     failure_map_figure,
     fault_margins,
     fault_pairs,
+    margins_of_both,
     radius_steps,
     search,
+    tried,
 )
-from .trend import trend
-from .tuning import bought, margins_of_both, tried
 
 __all__ = [
     "CLIP",

@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nlctl.annotations import as_annotated
-from nlctl.plotting.axes import WIDTH, set_style
-from nlctl.plotting.labels import plain
+from nlctl.plotting.axes import WIDTH, plain, set_style
 
 _LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
 _RETURNS = "\n\nReturns\n-------\nFigure\n    Of matplotlib; nothing is written or shown."

@@ -15,9 +15,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from nlctl.plotting.axes import BLUE, GREY, ORANGE, SHORT_LINE, TIME, legend_above, stacked_axes
+from nlctl.plotting.axes import (
+    BLUE,
+    GREY,
+    ORANGE,
+    SHORT_LINE,
+    TIME,
+    legend_above,
+    plain,
+    stacked_axes,
+)
 from nlctl.plotting.bands import Limit, bands
-from nlctl.plotting.labels import plain
 
 from ..robustness.stl.spec import violates
 from .labels import arms, draws, panels, within_reach

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, fmpq
+import numpy as np
+from flint import arb, fmpq, fmpq_mat
 
 from nlctl.expressions.functions import FUNCTIONS
 
@@ -102,19 +103,7 @@ def as_sum(x: object) -> Any:
 
 
 class Sum(NumPyFunctions):
-    """A sum of products of atoms, as equations compute with it.
-
-    Examples
-    --------
-    A difference that is 0 whatever x is:
-
-    >>> import numpy as np
-    >>> from nlctl.analysis.intervals.normal_form import indeterminate
-    >>> x = indeterminate("x")
-    >>> difference = np.sin(2 * x) * (x + 1) - np.sin(x + x) - x * np.sin(2 * x)
-    >>> len(difference.terms)
-    0
-    """
+    """A sum of products of atoms, as equations compute with it."""
 
     __slots__ = ("partial", "terms")
     rank = 2
@@ -216,25 +205,33 @@ class Sum(NumPyFunctions):
 
 
 def exact(number: Any) -> Fraction:
-    """Return a number as the fraction that it is.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.intervals.normal_form import exact
-    >>> print(exact(0.5))
-    1/2
-    """
+    """Return a number as the fraction that it is."""
     return number if isinstance(number, Fraction) else Fraction(float(number))
 
 
 def indeterminate(name: str) -> Sum:
-    """Return a symbol as a sum, which equations take instead of a number.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.intervals.normal_form import indeterminate
-    >>> x = indeterminate("x")
-    >>> sorted((x * x - x + 1).terms.values())
-    [Fraction(-1, 1), Fraction(1, 1), Fraction(1, 1)]
-    """
+    """Return a symbol as a sum, which equations take instead of a number."""
     return Sum({frozenset([(Atom(name), 1)]): Fraction(1)})
+
+
+def rational(x: object) -> fmpq:
+    """Return a finite number as a rational one of flint."""
+    if isinstance(x, fmpq):
+        return x
+    fraction: Fraction = exact(x)
+    return fmpq(fraction.numerator, fraction.denominator)
+
+
+def exact_matrix(M: np.ndarray) -> fmpq_mat:
+    """Return a matrix of finite floats, as it is."""
+    rows, columns = M.shape
+    return fmpq_mat(rows, columns, [rational(v) for v in M.ravel()])
+
+
+def is_positive_definite(M: fmpq_mat) -> bool:
+    """Whether a symmetric matrix is, by its leading minors."""
+    rows = M.tolist()
+    return all(
+        fmpq_mat(k, k, [v for row in rows[:k] for v in row[:k]]).det() > 0
+        for k in range(1, len(rows) + 1)
+    )

@@ -55,16 +55,7 @@ _MOST = 2_000
 
 
 def type_question(function: object) -> str | None:
-    """Return what a function, or one that it calls, asks of its arguments; None for nothing.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.intervals.type_questions import type_question
-    >>> print(type_question(lambda v: v if isinstance(v, float) else 2 * v).partition(" in ")[0])
-    asks isinstance
-    >>> print(type_question(lambda v: 2 * v))
-    None
-    """
+    """Return what a function, or one that it calls, asks of its arguments; None for nothing."""
     waiting, seen = [function], {}
     while waiting and len(seen) < _MOST:
         thing = waiting.pop()

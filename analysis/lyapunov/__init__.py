@@ -16,13 +16,12 @@ from .certificate.gains import GainDesign, design
 from .certificate.known_sign import KnownSignCertificate
 from .certificate.sliding_mode import SlidingModeCertificate
 from .conservatism import Conservatism, DirectBound, comparison, conservatism
-from .constants import Constants, constants, disturbance, kappa
+from .constants import Constants, Premises, constants, disturbance, kappa, literal, premises
 from .examination import Examination, examine
 from .inequalities import inequalities
 from .ledger import Ledger, ledger
 from .lines import Line
-from .loop.instrumented import observed
-from .loop.integral import NussbaumIntegral, sharpest
+from .loop.instrumented import NussbaumIntegral, observed, sharpest
 from .loop.roles import Parts, read_parts
 from .loop.signals import Margin, Signals, signals_of
 from .model_reference.model_certificate import ModelReferenceCertificate
@@ -30,7 +29,6 @@ from .nussbaum.aftermath import Aftermath, aftermath
 from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
 from .nussbaum.property import nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, burst_peak, slow_drift
-from .premises import Premises, literal, premises
 from .proofs.result import Certificate, Constant
 from .tighten import Tightened, tighten
 

@@ -15,14 +15,13 @@ from nlctl.attributes import described_record
 from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
-from .bounds.final_bound import KAPPA
+from .bounds.error_bounds import KAPPA
 from .bounds.weights import Network, tightest_weights
-from .constants import Constants
+from .constants import Constants, Premises, premises
 from .examination import Examination, examine
 from .inequalities import terms
 from .loop.signals import Signals, peak_by_rates
 from .nussbaum.property import root
-from .premises import Premises, premises
 
 if TYPE_CHECKING:
     import pandas as pd

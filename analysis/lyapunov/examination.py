@@ -19,7 +19,7 @@ from ..intervals.box import Box, visited_box
 from .bounds.decomposition import Decomposition, decompose
 from .constants import Constants, constants_of
 from .loop import simulation
-from .loop.integral import sharpest
+from .loop.instrumented import sharpest
 from .loop.roles import read_parts
 
 U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX

@@ -16,9 +16,9 @@ from nlctl.annotations import as_annotated
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
 
-from .bounds.final_bound import KAPPA
+from .bounds.error_bounds import KAPPA
+from .constants import Premises
 from .loop.signals import INTEGRATED, Margin, Signals, equality, inequality
-from .premises import Premises
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,13 +21,12 @@ from nlctl.wording import counted
 from ..json_values import as_json
 from ..loop_record import loop_facts
 from .conclusions import conclusions, slow_drift_of
-from .constants import Constants
+from .constants import Constants, premises
 from .examination import U_MAX, Examination, examine
 from .inequalities import terms
 from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
 from .loop.signals import peak_by_rates
 from .nussbaum.slow_drift import SlowDrift
-from .premises import premises
 
 if TYPE_CHECKING:
     import pandas as pd

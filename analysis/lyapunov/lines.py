@@ -11,13 +11,12 @@ from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from ..intervals.box import Box
-from .bounds.final_bound import alpha_1
-from .constants import Constants, kappa
+from .bounds.error_bounds import alpha_1
+from .constants import Constants, Premises, forcing_bound, kappa, literal, premises
 from .inequalities import inequalities
 from .loop.instrumented import update_is_declared
 from .loop.signals import Margin, Signals, inequality
 from .loop.simulation import MemberRun
-from .premises import Premises, forcing_bound, literal, premises
 from .proofs.result import Provenance
 
 LineStatus = Literal["proved", "computed", "checked", "violated", "not applicable", "undecided"]

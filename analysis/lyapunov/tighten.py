@@ -23,14 +23,13 @@ from nlctl.wording import counted
 from ..intervals.box import Box, visited_box
 from ..metrics import peak
 from .bounds.decomposition import Decomposition, decompose
-from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .bounds.error_bounds import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import sector
 from .bounds.weights import approximation_error, network_on_grid, tightest_weights
 from .certificate.gains import GainCandidate, tradeoff
 from .constants import disturbance
 from .examination import U_MAX, Examination, examine
-from .loop.instrumented import observed
-from .loop.integral import sharpest
+from .loop.instrumented import observed, sharpest
 from .loop.roles import Parts, read_parts
 from .loop.signals import signals_of
 from .loop.simulation import SAMPLING_INTERVAL

@@ -1,8 +1,10 @@
-"""Two reports as a page: which claims, figures and numbers changed, and signals of both."""
+"""Reports compared: two as a page, with signals of both, and one over its revisions."""
 
 from __future__ import annotations
 
+import json
 import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,10 +15,11 @@ from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from .. import figures
-from ..report.changes import ClaimChange, Curves, claim_changes, curves_of, figure_changes
-from ..report.compare import ABSENT, Difference, differing_numbers
+from ..report.changes import ClaimChange, Curves, Trend, claim_changes, curves_of, figure_changes
+from ..report.compare import ABSENT, Difference, differing_numbers, read_report
 from ..report.document import (
     Claim,
+    Figure,
     Headline,
     Item,
     Paragraph,
@@ -26,7 +29,11 @@ from ..report.document import (
     captioned,
     versions,
 )
-from ..report.outline import sort_key, summary
+from ..report.outline import claim_status, sort_key, summary
+from ..report.render import render_json
+from ..studies import load_result, origin_differences
+from ..studies.differences import long_table_differences
+from .study.report import study_report
 
 _LISTED = 100  # numbers of a table
 _DRAWN = 4  # signals of a figure
@@ -81,7 +88,7 @@ def comparison_page(
         title=f"Compared: {', and '.join(titles)}",
         question="what does the second report say that the first did not?",
         verdict=_verdict(claims, numbers, pictures, curves),
-        headline=_headline(claims, count, len(pictures)),
+        headline=_headline(claims, count),
         claims=[],
         sections=sections,
         command=command,
@@ -90,7 +97,7 @@ def comparison_page(
     )
 
 
-def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headline:
+def _headline(claims: Sequence[ClaimChange], count: int) -> Headline:
     """Return how the claims changed, or that nothing differs."""
     moved: dict[tuple[str, str], list[ClaimChange]] = {}
     for change in claims:
@@ -316,3 +323,56 @@ def _compared_section(first: Compared, second: Compared) -> Section:
         rows=[row for row in rows if any(row[1:])],
     )
     return Section(key="compared", title="The two reports", items=[table])
+
+
+def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Report:
+    """Compose the page of two reports or runs, which have been checked."""
+    both = (first, second)
+    are_runs = all((path / "results.json").exists() for path in both)
+    others = []
+    if are_runs:
+        others = [*long_table_differences(first, second, rtol)]
+        if origins := origin_differences(first, second):
+            others.insert(0, f"The runs were not computed from the same: {origins}")
+    command = ["nlctl", "compare", *(path.as_posix() for path in both)]
+    command += ["--rtol", f"{rtol:g}"] * (rtol > 0) + ["--out", out.as_posix()]
+    return comparison_page(
+        *(_compared(path) for path in both),
+        rtol=rtol,
+        common=are_runs,
+        others=others,
+        command=shlex.join(command),
+    )
+
+
+def _compared(path: Path) -> Compared:
+    """Return what is compared; a run without a page has what its page would say without figures."""
+    if path.is_dir() and not (path / "report.json").exists():
+        page = json.loads(render_json(study_report(load_result(path))))
+        return Compared(name=path.as_posix(), content=page)
+    folder = path if path.is_dir() else path.parent
+    return Compared(name=path.as_posix(), content=read_report(path), folder=folder)
+
+
+_ENDS = {
+    **dict.fromkeys(("pass", "proved", "checked"), "holds"),
+    **dict.fromkeys(("refuted", "fail"), "fails"),
+}
+
+
+def trend_figure(trend: Trend) -> Figure:
+    """Return the figure: how each claim ended, and the first of the main numbers."""
+    claims = {  # how each ended, in one of the words of the figure
+        name: ["" if c is None else _ENDS.get(claim_status(c)[1], "open") for c in row]
+        for name, row in trend.claims.items()
+    }
+    numbers = dict(list(trend.numbers.items())[:_DRAWN])
+    ended = "; ".join(
+        f"{name}: {', '.join(end or 'not made' for end in ends)}" for name, ends in claims.items()
+    )
+    return Figure(
+        key="trend",
+        caption=f"{trend.title}: its claims and main numbers over {', '.join(trend.labels)}.",
+        description=f"Claims over {', '.join(trend.labels)}. {ended}",
+        figure=figures.trend(trend.labels, claims, numbers),
+    )

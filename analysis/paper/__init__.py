@@ -1,8 +1,19 @@
 """What is only about Lv et al. (2017): its reproduction, loops, controllers, page."""
 
-from .cases import BOUND, CASES, HORIZON, METRICS, TAIL, Case, sample_times
 from .controllers import compared_controllers
-from .reproduction import Expectation, checks, expectations, numerics
+from .reproduction import (
+    BOUND,
+    CASES,
+    HORIZON,
+    METRICS,
+    TAIL,
+    Case,
+    Expectation,
+    checks,
+    expectations,
+    numerics,
+    sample_times,
+)
 
 __all__ = [
     "BOUND",

@@ -1,11 +1,13 @@
-"""What the report's part on the proof is made of: one loop, examined."""
+"""What the report's part on the proof is made of: one loop, examined, and runs that are kept."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import field, replace
+from pathlib import Path
 from threading import Event
 from typing import cast
 
@@ -20,6 +22,7 @@ from nlctl.response import input_output_response
 from ..lyapunov.certificate.certify import certify
 from ..lyapunov.certificate.known_sign import KnownSignCertificate
 from ..lyapunov.conservatism import Conservatism, conservatism
+from ..lyapunov.constants import premises
 from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
 from ..lyapunov.inequalities import inequalities, terms
@@ -27,13 +30,43 @@ from ..lyapunov.ledger import Ledger, ledger
 from ..lyapunov.lines import assumptions
 from ..lyapunov.loop.signals import Margin, signals_of
 from ..lyapunov.nussbaum.energy import finite_signal
-from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run
+from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LOOKS, LongRun, long_run
 from ..lyapunov.nussbaum.slow_drift import SlowDrift
-from ..lyapunov.premises import premises
 from ..metrics import peak
 from .burst import Burst, through_the_burst
 from .controllers import compared_controllers
-from .reference_run import continued, read_record
+
+RECORD = Path(__file__).with_name("example-2-burst.csv")
+AGREE = 5.0  # s; bursts at two tolerances differ by less
+
+
+def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
+    """Return the record as a run, with the lobe and the predictions of a run made today."""
+    with path.open(encoding="utf-8") as file:
+        about = json.loads(file.readline().removeprefix("# "))
+        time, *rows = np.loadtxt(file, delimiter=",").T
+    signals = dict(zip(LONG_RUN_SIGNALS, rows, strict=True))
+    about["again"] = about["again"] and tuple(about["again"])
+    about["last"] = tuple(about.get("last", ()))
+    return replace(beginning, time=time, signals=signals, **about)
+
+
+def continued(beginning: LongRun, record: LongRun) -> LongRun:
+    """Return a run that continues the record where it ends."""
+    end = beginning.time[-1]
+    before = float(np.interp(end, record.time, record.signals["zeta"]))
+    if not abs(before - beginning.signals["zeta"][-1]) < 1e-4:
+        raise ValueError(
+            f"the record of '{record.loop}' has zeta = {before:.5f} at {end:g} s, a run of today "
+            f"{beginning.signals['zeta'][-1]:.5f}: make it again with "
+            "'python campaign/burst_record.py', in a checkout"
+        )
+    later = record.time > end
+    signals = {
+        name: np.append(y, record.signals[name][later]) for name, y in beginning.signals.items()
+    }
+    return replace(record, time=np.append(beginning.time, record.time[later]), signals=signals)
+
 
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
 LOOK = min(LOOKS)  # s; from so much of a run the slow drift of zeta is predicted
@@ -122,7 +155,7 @@ NO_FAR_RUNS = FarRuns()
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[FarRuns]]:
     """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs."""
     # Example 2 is run as far as its burst is predicted from, and continues the record of
-    # `nlctl.analysis.paper.reference_run`; with `whole` it is run to its burst, which takes
+    # `nlctl.analysis.paper.evidence`; with `whole` it is run to its burst, which takes
     # minutes.
     stop = Event()
     with ThreadPoolExecutor(1) as pool:

@@ -24,7 +24,7 @@ from nlctl.plotting.axes import (
     stacked_axes,
 )
 
-from ..reproductions.cases import PaperRun
+from ..reproductions.paper import PaperRun
 from . import TAIL
 from .burst import Burst
 

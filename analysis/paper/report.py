@@ -20,19 +20,18 @@ from ..pages.study.histories import loop_again, rows_again
 from ..pages.study.report import study_part
 from ..report.document import Section
 from ..report.svg import draw_ahead
-from ..reproductions.cases import PaperRun, simulate_cases
 from ..reproductions.page import Composed, ProgressWatch, unwatched
+from ..reproductions.paper import PaperRun, simulate_cases
 from ..robustness import prepare
 from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
 from ..robustness.runs.store import parquet
 from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
 from . import evidence as proofs
-from .cases import CASES, HORIZON
 from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
-from .reproduction import checks, numerics
+from .reproduction import CASES, HORIZON, checks, numerics
 from .rivals import checked_rivals
 from .sampling_limits import checked_record
 

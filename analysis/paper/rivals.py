@@ -88,18 +88,6 @@ def _paper(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
     )
 
 
-def _pid(example: str, gains: Mapping[str, float]) -> PID:
-    return PID(**_of(gains, "controller"), u_max=100)
-
-
-def _sliding(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
-    return sliding_mode(_part(example, "filtered_error"), SlidingModeLaw(**_of(gains, "law")))
-
-
-def _twisting(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
-    return sliding_mode(_part(example, "filtered_error"), SuperTwistingLaw(**_of(gains, "law")))
-
-
 def _dynamic_surface(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
     return dynamic_surface_control(
         DynamicSurface(c=_vector(gains, "surface.c"), tau=_vector(gains, "surface.tau")),
@@ -119,18 +107,20 @@ def _order(example: str) -> int:
     return _part(example, "filtered_error").plant_order
 
 
-def _funnel(example: str, gains: Mapping[str, float]) -> FunnelControl:
-    return FunnelControl(order=_order(example), rho_0=5.0, **_of(gains, "controller"))
-
-
 _MAKERS: dict[str, Callable[[str, Mapping[str, float]], Any]] = {
     "paper, tuned": _paper,
-    "PID": _pid,
-    "sliding mode": _sliding,
-    "super-twisting": _twisting,
+    "PID": lambda example, gains: PID(**_of(gains, "controller"), u_max=100),
+    "sliding mode": lambda example, gains: sliding_mode(
+        _part(example, "filtered_error"), SlidingModeLaw(**_of(gains, "law"))
+    ),
+    "super-twisting": lambda example, gains: sliding_mode(
+        _part(example, "filtered_error"), SuperTwistingLaw(**_of(gains, "law"))
+    ),
     "dynamic surface": _dynamic_surface,
     "prescribed performance": _prescribed,
-    "funnel": _funnel,
+    "funnel": lambda example, gains: FunnelControl(
+        order=_order(example), rho_0=5.0, **_of(gains, "controller")
+    ),
 }
 
 

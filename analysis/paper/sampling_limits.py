@@ -20,8 +20,8 @@ from nlctl.native import Compiled, ensemble_response
 from nlctl.native import compile as compiled_loop
 from nlctl.sampling import sampled
 
-from .cases import HORIZON, TAIL
 from .controllers import compared_controllers
+from .reproduction import HORIZON, TAIL
 
 SAMPLING_RECORD = Path(__file__).with_name("sampling-limits.csv")
 BAND, PEAK = 0.15, 15.0  # the spec of reports/example-1.toml: |y - yd| from 10 s on, and |u|

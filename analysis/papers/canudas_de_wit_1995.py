@@ -11,9 +11,17 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.papers import canudas_de_wit_1995 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import paths_figure, rows_over_time
-from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
+from ..reproductions.paper import (
+    Paper,
+    PaperCase,
+    PaperFigure,
+    PaperRun,
+    PaperRuns,
+    PaperSource,
+    Part,
+    Statement,
+)
 
 _F_S, _SIGMA_0, _PUSH = 1.5, 1e5, 1.425
 _TIGHT: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-12}

@@ -11,9 +11,17 @@ from scipy.linalg import solve_continuous_lyapunov
 from nlctl.papers import chowdhary_2010 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
-from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
+from ..reproductions.paper import (
+    Paper,
+    PaperCase,
+    PaperFigure,
+    PaperRun,
+    PaperRuns,
+    PaperSource,
+    Part,
+    Statement,
+)
 
 _TIMES = np.linspace(0, 40, 4001)
 W, _GAMMA = (-1.0, 1.0, 0.5), 3.5

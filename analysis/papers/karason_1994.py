@@ -10,9 +10,17 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.papers import karason_1994 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
-from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
+from ..reproductions.paper import (
+    Paper,
+    PaperCase,
+    PaperFigure,
+    PaperRun,
+    PaperRuns,
+    PaperSource,
+    Part,
+    Statement,
+)
 
 _TIMES = np.linspace(0, 20, 8001)
 _THETA, K = -2.0, 1.0  # the gains of the matching conditions

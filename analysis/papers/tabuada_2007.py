@@ -10,9 +10,17 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.papers import tabuada_2007 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
-from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
+from ..reproductions.paper import (
+    Paper,
+    PaperCase,
+    PaperFigure,
+    PaperRun,
+    PaperRuns,
+    PaperSource,
+    Part,
+    Statement,
+)
 
 PLANT_MATRIX = np.array([[0.0, 1.0], [-2.0, 3.0]])
 BK = np.array([[0.0], [1.0]]) @ np.array([[1.0, -4.0]])

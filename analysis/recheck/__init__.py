@@ -19,8 +19,8 @@ from fractions import Fraction
 from typing import Any
 
 from .content import FORMAT, Record, Refuted, need, seal_of
-from .digits import exact_text, text_above
 from .filtered import filter_text, known_sign_bounds, sliding_mode_bounds
+from .integers import exact_text, text_above
 from .reference_model import model_text, reference_model_bounds
 
 __all__ = ["FORMAT", "RECHECKED", "Refuted", "proved_bounds", "recheck", "seal_of"]

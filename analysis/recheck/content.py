@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from .digits import exact_text
-from .integers import Interval
+from .integers import Interval, exact_text
 
 FORMAT = ["nlctl certificate", 1]
 _RATIONAL = re.compile(r"-?\d{1,400}(/[1-9]\d{0,400})?\Z")

@@ -8,8 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from .content import need, read_rational
-from .digits import exact_text
-from .integers import KNOWN_FUNCTIONS, UNITY, ZERO, Interval
+from .integers import KNOWN_FUNCTIONS, UNITY, ZERO, Interval, exact_text
 
 _INF = math.inf
 _CELLS = 4_000

@@ -9,9 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from .content import Record, begins, need, read_rational, read_split, split_text, states_text
-from .digits import exact_text
 from .equations import WrittenEquation, stays
-from .integers import ALL, PI_ENCLOSED, TWO, ZERO, Interval, absolute, sqrt
+from .integers import ALL, PI_ENCLOSED, TWO, ZERO, Interval, absolute, exact_text, sqrt
 
 _INF = math.inf
 _KAPPA = Fraction(2785, 10_000)  # above the largest s - s tanh s

@@ -12,13 +12,12 @@ from urllib.parse import quote
 from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 
-from .changes import STATUS_RANK
+from .changes import STATUS_RANK, Revision, Trend, trends
 from .compare import read_report
 from .document import Claim, Figure, Headline
 from .outline import claim_status, summary
 from .page import check_gallery_folder, fill, write_files
 from .svg import inline_drawings
-from .trends import Revision, Trend, trends
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,7 @@ from .search.confirmation import Confirmation, confirm
 from .search.degradation import Degradation, degradation_curve
 from .search.failure_map import FailureMap, boundary, failure_map
 from .search.first_order import FirstOrder, first_order
-from .search.largest_scale import largest_scale
-from .search.radius import Radius, robustness_radius
+from .search.radius import Radius, largest_scale, robustness_radius
 from .search.shrink import Shrunk, shrink
 from .search.worst_case import WorstCase, worst_case
 from .statistics.comparison import Comparison, compare, crossed
@@ -31,8 +30,15 @@ from .statistics.sensitivity import (
     saltelli,
     sobol_indices,
 )
-from .statistics.sequential import SequentialTest, confidence_sequence, decide, sequence_bounds
-from .statistics.verdict import Verdict, bound_verdict, test_verdict
+from .statistics.sequential import (
+    SequentialTest,
+    Verdict,
+    bound_verdict,
+    confidence_sequence,
+    decide,
+    sequence_bounds,
+    test_verdict,
+)
 from .stl.formula import always, eventually, in_band
 from .stl.spec import Requirement, Spec, margin, margins, unfinished_margin
 from .stl.text import parse_formula
@@ -48,8 +54,7 @@ from .uncertainty.design import (
     sobol,
 )
 from .uncertainty.lattice import corners, grid, one_at_a_time
-from .uncertainty.quantity import Choice, SpaceError, Uncertain
-from .uncertainty.space import Space, arguments, nominal, scaled
+from .uncertainty.space import Choice, Space, SpaceError, Uncertain, arguments, nominal, scaled
 
 __all__ = [
     "BurstForecast",

@@ -1,17 +1,14 @@
 """Study files: what is uncertain, what is asked, and everything connected to answer it."""
 
 from .differences import origin_differences, run_differences
-from .file.asked import Asked, Varied
 from .file.errors import Problem, StudyError
-from .file.schema import Study, to_toml
-from .file.shipped import shipped
-from .folder import load_result
-from .integrity import Integrity, verify
+from .file.schema import Asked, Study, Varied, to_toml
+from .folder import Integrity, load_result, verify
 from .kind import Ground, Kind, Setup, finding_of
 from .kinds import KINDS
 from .plan import Plan, plan
 from .reading.own_kinds import from_toml
-from .reading.parse import StudyFile, read_study
+from .reading.parse import StudyFile, read_study, shipped
 from .replay import Replay, replay, replay_figure
 from .result import Finding, Result
 from .run import run

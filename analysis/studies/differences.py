@@ -13,7 +13,7 @@ import pandas as pd
 from nlctl.annotations import as_annotated
 from nlctl.wording import counted
 
-from ..robustness.runs.identity import differences_of
+from ..robustness.runs.store import differences_of
 from .folder import checked, load_result, load_run
 from .origin import loop_differences, version_differences
 from .result import LISTED, Result

@@ -32,8 +32,7 @@ from nlctl.errors import ParameterError, UsageError
 from ..robustness import Design, Experiment, Prepared, Space
 from ..robustness.runs.progress import Progress
 from ..robustness.runs.sweep import Sweep
-from .file.asked import Asked
-from .file.schema import Study
+from .file.schema import Asked, Study
 from .result import Finding, Result
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from ..loop_record import (
     values_differ,
 )
 from ..robustness import Prepared, diagrams
-from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
+from ..robustness.runs.store import differences_of, experiment_facts, labels_text
 from .file.schema import Study, keyed, study_data
 from .kind import Setup
 

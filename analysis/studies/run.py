@@ -24,7 +24,7 @@ from .build import main_design
 from .code.rule import remember_code
 from .file.schema import keyed, study_data, to_toml
 from .folder import checked, load_finding, load_run, load_study, save_finding
-from .intact.contents import seal, unseal
+from .intact import seal, unseal
 from .kind import Ground, Setup, headed, unanswered
 from .origin import (
     compared_differences,

@@ -1,6 +1,6 @@
 """Block diagrams as pictures.
 
-`records` on paper, `order` of blocks, `heights`, `routes`, and the `picture`.
+`records` on paper, `order` of blocks, `routes`, and the `picture`.
 """
 
 from .picture import draw

@@ -1,11 +1,9 @@
 """Controllers and equations as code for other machines: C99, object code, FMUs."""
 
-from .controller import export_controller
-from .equations import export_equations
+from .controller import export_controller, export_equations
 from .fmi.archive import fmu
 from .objects import TARGETS, Target, object_code
-from .records import ExportedController, ExportedEquations
-from .source import c_files
+from .source import ExportedController, ExportedEquations, c_files
 
 __all__ = [
     "TARGETS",

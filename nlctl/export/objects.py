@@ -16,7 +16,7 @@ from ..names import unknown
 from ..native.codegen.ir.program import COPY, program_text
 from ..native.codegen.ir.text import float_text
 from ..native.machine.finish import program_code
-from .records import ExportedController
+from .source import ExportedController
 
 
 @described_record

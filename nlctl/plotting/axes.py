@@ -3,13 +3,35 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
+
+_LONGEST = 30
+
+
+def plain(name: object) -> str:
+    """Return a name as text that the font can draw, cut to a length that fits a figure."""
+    # Use it with ``parse_math=False``. Tables show names in full.
+    text = "".join(_drawn(character) for character in str(name))
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 12]}…{text[-11:]}"
+
+
+@cache
+def _drawn(character: str) -> str:
+    """Return a character, or a box where the font lacks it or it only steers others."""
+    if unicodedata.category(character)[0] == "C":
+        return "□"
+    font = get_font(findfont(FontProperties()))
+    return character if font.get_char_index(ord(character)) else "□"
+
 
 # Okabe-Ito, with a darker purple: distinguishable for colour-blind readers; line styles, markers or
 # hatches distinguish as well.  One colour has one meaning in all figures:

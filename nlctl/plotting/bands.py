@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..annotations import as_annotated
-from .axes import BLUE, ORANGE, STYLES, TEXT_INK, TIME, legend_above, stacked_axes
-from .labels import plain
+from .axes import BLUE, ORANGE, STYLES, TEXT_INK, TIME, legend_above, plain, stacked_axes
 
 BANDS = ((0.0, 1.0, 0.2), (0.05, 0.95, 0.35), (0.25, 0.75, 0.6))  # quantiles, opacity
 LINES = ("-", "--", "-.", ":")  # of single runs

@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .axes import STYLES, TIME, legend_above, stacked_axes
-from .labels import plain
+from .axes import STYLES, TIME, legend_above, plain, stacked_axes
 
 
 def rows_figure(

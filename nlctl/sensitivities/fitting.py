@@ -21,8 +21,15 @@ from ..native.diagram.checks import sized
 from ..native.floats import with_floats
 from ..params import as_numbers, integer
 from ..responses.arguments import HOLDS, checked_params, with_aliases
-from .fitted import Fit, FittedExperiment
-from .measured import Measurement, Observations, check_tell, measurements, observations
+from .measured import (
+    Fit,
+    FittedExperiment,
+    Measurement,
+    Observations,
+    check_tell,
+    measurements,
+    observations,
+)
 from .names import VariedQuantity, checked_names, parameters_and_states, varied_quantities
 from .record import SensitivityResponse
 from .response import sensitivity_response

@@ -1,22 +1,345 @@
-"""Derivatives of a run: what is asked, and what is returned."""
+"""Derivatives of a run: what is asked, how it is run, and what is returned."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import control as ct
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
 from ..arguments import one_of, tolerances
+from ..errors import CompileError, InexactWarning
 from ..native import Compiled, Tableau, compile  # noqa: A004 (what it does)
+from ..native.audit import Trial, audit
 from ..native.diagram.checks import sized
-from ..native.settings import solver_settings
+from ..native.driver import Course, begin, prepared, run_once, slid_from
+from ..native.floats import with_floats
+from ..native.integrate.state import Status
+from ..native.jacobians import inexact
+from ..native.response import respond
+from ..native.results import Trajectory
+from ..native.settings import Settings, solver_settings
+from ..native.slid import SlidRun
+from ..native.spare import give_back
 from ..params import checked_times
-from ..responses.arguments import HOLDS, checked_params, with_aliases
+from ..responses.arguments import (
+    HOLDS,
+    checked_params,
+    held,
+    input_array,
+    state_array,
+    with_aliases,
+)
+from .missing import Arrays, commits_at_start, evaluated_rows, missing
+from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
+from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
-from .run import RunWithDerivatives, differentiated_run
+from .schedule import Sent
+
+_STEP, _PART = 1e-9, 1e-4  # how long steps of held inputs take: of the run, and of an interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunWithDerivatives:
+    """What a run with derivatives is asked."""
+
+    # as `nlctl.input_output_response` takes them
+    times: np.ndarray
+    inputs: Any
+    initial_state: Any
+    params: Mapping[str, Any] | None
+    of: Sequence[str] | None
+    with_respect_to: Sequence[str]
+    hold: str
+    settings: Settings
+    audit: Any
+
+
+def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> SensitivityResponse:
+    """Integrate a diagram with its derivatives."""
+    if not ct.isctime(compiled.system):
+        raise CompileError(
+            f"'{compiled.system.name}' is in discrete time: derivatives of runs are for diagrams "
+            "in continuous time; nlctl.sampled has blocks with a clock in these"
+        )
+    names = checked_names("with_respect_to", run.with_respect_to)
+    compiled = with_floats(compiled, names)
+    u = input_array(compiled.system, run.inputs, run.times)
+    shown = 1  # of how many times each is one that was asked for
+    if run.hold == "zoh" and u.size:
+        (times, u), shown = _steps(run.times, u), 2
+        run = replace(run, times=times, inputs=u)
+    p = compiled.parameter_vector(run.params)
+    cut = compiled.equations_with(p).cut
+    if cut and _alone(compiled, run).statistics.called:  # it takes more passes than are written out
+        compiled = compiled.calling(cut)
+    signals = observed_signals(compiled, run.of)
+    quantities = varied_quantities(compiled, names)
+    x0 = state_array(compiled.system, run.initial_state)
+    values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
+    scale = np.array([abs(v) or 1.0 for v in values])
+    named = signals, quantities
+    one = _integrated(compiled, run, named, (u, x0, p, scale))
+    slid = _slid(compiled, run, one.reached, (u, x0, p))
+    if slid.slides:
+        x0 = np.append(x0, np.zeros(len(slid.slides)))
+        one = _integrated(slid.compiled, run, named, (u, x0, slid.p, scale))
+        one = replace(one, reached=slid.named(one.reached))
+    differentiated, reached, start, whole = one.differentiated, one.reached, one.start, one.p
+    _audit(compiled, reached, p, run)
+    if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
+        _alone(compiled, run)
+    if shown > 1:
+        reached = _shown(shown, reached, differentiated, whole)
+    full = tuple(quantity.name for quantity in quantities)
+    given = (run.times, start, whole, u)
+    lacks = missing(differentiated, (slid.compiled, full), reached, given, one.commits)
+    return _response(
+        differentiated, (signals, quantities), (run.times[::shown], reached), scale, lacks
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Integrated:
+    """A run of a program with derivatives."""
+
+    differentiated: Differentiated
+    reached: Trajectory
+    start: np.ndarray  # its initial state
+    p: np.ndarray  # and its parameters
+    commits: list[Arrays]
+
+
+def _integrated(
+    compiled: Compiled,
+    run: RunWithDerivatives,
+    named: tuple[Sequence[Observed], Sequence[VariedQuantity]],
+    given: tuple[np.ndarray, ...],
+) -> _Integrated:
+    """Run a diagram with its derivatives."""
+    (signals, quantities), (u, x0, p, scale) = named, given
+    differentiated = _compiled(compiled, signals, quantities, p, run.settings)
+    span = float(run.times[0]), float(run.times[-1])
+    rise = float(np.ptp(u, axis=1).max(initial=0.0))
+    whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span, rise)
+    start, commits = _start(differentiated, quantities, run, (u, x0, scale), whole)
+    reached = run_once(_course(differentiated.compiled, run, u), start, whole)
+    return _Integrated(
+        differentiated=differentiated, start=start, p=whole, commits=commits,
+        reached=_at_its_end(reached, run.times.size, differentiated.outputs),
+    )  # fmt: skip
+
+
+def _slid(
+    compiled: Compiled, run: RunWithDerivatives, reached: Trajectory, given: tuple[np.ndarray, ...]
+) -> SlidRun:
+    """Return the run without derivatives that slides, if the one with them switches without end."""
+    u, x0, p = given
+    course = _course(compiled, run, u)
+    if reached.statistics.status not in (Status.ZENO, Status.CHATTERING):
+        return SlidRun(compiled=compiled, p=p, reached=reached)
+    return slid_from(course, run_once(course, x0, p), x0, p)
+
+
+def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:
+    """Return a run that has come to its end, if only derivatives of outputs are NaN somewhere."""
+    # An output may have a corner of its own, as a norm at 0 has: nothing else knows of it.
+    ended = reached.time.size == samples and np.isfinite(reached.outputs[:outputs]).all()
+    if reached.statistics.status is not Status.DIVERGED or not ended:
+        return reached
+    return replace(reached, statistics=replace(reached.statistics, status=Status.OK))
+
+
+def _steps(times: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return held inputs with steps that take long enough for events to be located in them."""
+    over = np.minimum(_STEP * np.ptp(times), _PART * np.diff(times))
+    return held(times, u, over)
+
+
+def _shown(
+    shown: int, reached: Trajectory, differentiated: Differentiated, p: np.ndarray
+) -> Trajectory:
+    """Return a run with held inputs, which nothing sees step, at the times that were asked for."""
+    arrays = {name: getattr(reached, name) for name in ("time", "outputs", "states", "inputs")}
+    reached = replace(reached, **{name: rows[..., ::shown] for name, rows in arrays.items()})
+    arrays = {"t": reached.time[None], "x": reached.states, "u": reached.inputs, "p": p[:, None]}
+    differentiated.sides.source.check_steps(arrays)
+    return reached
+
+
+def _alone(compiled: Compiled, run: RunWithDerivatives) -> Any:
+    """Run a diagram without derivatives; raise why that does not reach its end."""
+    return respond(
+        compiled, run.times, run.inputs, run.initial_state, settings=run.settings,
+        params=run.params, audit=False,
+    )  # fmt: skip
+
+
+def _compiled(
+    compiled: Compiled,
+    signals: Sequence[Observed],
+    quantities: Sequence[VariedQuantity],
+    p: np.ndarray,
+    settings: Settings,
+) -> Differentiated:
+    """Return a diagram that is compiled with its derivatives, made when it is first needed."""
+    key = repr((signals, quantities))
+    entries = compiled.cache.of(_Kept)
+    for entry in entries:
+        if entry.key == key and entry.holds_for(p):
+            return entry.differentiated
+    equations = compiled.equations_with(p)
+    why = inexact(equations, tuple(equations.results))
+    if why is not None:
+        warnings.warn(
+            f"derivatives of '{compiled.system.name}' are differences where {why}, and exact "
+            "elsewhere; jumps of such a function are not known",
+            InexactWarning,
+            stacklevel=4,
+        )
+    differentiated = with_its_derivatives(compiled, signals, quantities, p, settings)
+    entries.append(_Kept(key=key, differentiated=differentiated))
+    return differentiated
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kept:
+    """What has been compiled, of what and by what."""
+
+    key: str
+    differentiated: Differentiated
+
+    def holds_for(self, p: np.ndarray) -> bool:
+        """Whether the integers that its equations were read with are those of parameters."""
+        # with other integers a function may ask for further ones
+        assumed = self.differentiated.compiled.equations.graph.assumptions
+        return all(p[place] == value for place, value in assumed.items())
+
+
+def _start(
+    differentiated: Differentiated,
+    quantities: Sequence[VariedQuantity],
+    run: RunWithDerivatives,
+    given: tuple[np.ndarray, np.ndarray, np.ndarray],
+    p: np.ndarray,
+) -> tuple[np.ndarray, list[Arrays]]:
+    """Return the initial state behind all that happens at once, and the commits of memories."""
+    (u, x0, scale), places = given, differentiated.places
+    start = np.zeros(places.size)
+    start[: places.states] = x0
+    for j, quantity in enumerate(quantities):
+        if quantity.state >= 0:
+            start[places.derivative(j) + quantity.state] = scale[j]
+    end = float(run.times[-1])
+    never = end + 1.0 + abs(end)
+    start[places.together : places.number] = start[places.chosen : places.ticked] = never
+    sides, rated = differentiated.sides, differentiated.extended.sent >= Sent.RATES
+    if not sides.rows and not differentiated.compiled.program.sampled and not rated:
+        return start, []
+    arrays = _beginning(differentiated, run, u, start, p)
+    if rated:  # what is sent first may be another than what was before
+        layout, lines = differentiated.extended.layout, differentiated.extended.schedule.lines
+        before = [p[layout[line.block or 0]["before"].offset] for line in lines[: places.lines]]
+        first = evaluated_rows(differentiated, sides.source.arriving, arrays)
+        start[places.number : places.height] = 1.0
+        start[places.height : places.moved] = before - first
+    start[places.kept : places.together] = evaluated_rows(differentiated, sides.now, arrays)
+    memories = [*sides.source.driven, *sides.source.catching]
+    commits = commits_at_start(differentiated, x0, arrays)
+    rows = [places.derivative(j) + m for j in range(places.by) for m in memories]
+    start[rows] = commits[-1]["x"][rows, 0]
+    return start, commits
+
+
+def _course(compiled: Compiled, run: RunWithDerivatives, u: np.ndarray) -> Course:
+    """Return the run of a program."""
+    return Course(compiled=compiled, times=run.times, inputs=u, settings=run.settings)
+
+
+def _beginning(
+    differentiated: Differentiated,
+    run: RunWithDerivatives,
+    u: np.ndarray,
+    start: np.ndarray,
+    p: np.ndarray,
+) -> Arrays:
+    """Return what a run begins with, behind all that happens at once."""
+    first = prepared(_course(differentiated.compiled, run, u), start[:, None], p[:, None])
+    with np.errstate(all="ignore"):
+        begin(first)
+    work = first.work
+    time = np.maximum(first.lanes["right"][None, :1], run.times[0])
+    arrays = {"t": time, "x": work.x.copy(), "u": work.u.copy(), "p": p[:, None]}
+    if first.spare is not None:
+        give_back(differentiated.compiled.cache, first.spare)
+    return arrays
+
+
+def _audit(
+    compiled: Compiled, integrated: Trajectory, p: np.ndarray, run: RunWithDerivatives
+) -> None:
+    """Compare the equations with python-control's at points of the run, as any run is."""
+    count, rates = compiled.system.ninputs or 0, compiled.schedule.rates
+    count_with_lines = count + len(compiled.schedule.lines)
+    inputs = integrated.inputs[:count_with_lines]
+    if rates:
+        inputs = np.concatenate([inputs, integrated.inputs[len(integrated.inputs) - count :]])
+    trial = Trial(
+        time=integrated.time, states=integrated.states[: compiled.system.nstates or 0],
+        inputs=inputs, p=p, params=run.params, width=1,
+    )  # fmt: skip
+    audit(compiled, trial, run.audit)
+
+
+def _response(
+    differentiated: Differentiated,
+    names: tuple[Sequence[Observed], Sequence[VariedQuantity]],
+    run_of: tuple[np.ndarray, Trajectory],
+    scale: np.ndarray,
+    lacks: Any,
+) -> SensitivityResponse:
+    """Return the signals and their derivatives out of a trajectory."""
+    (signals, quantities), places, count = names, differentiated.places, differentiated.outputs
+    times, integrated = run_of
+    values = np.empty((len(signals), integrated.time.size))
+    derivatives = np.empty((len(signals), len(quantities), integrated.time.size))
+    driven = differentiated.sides.source.driven
+    rows = sorted(range(len(signals)), key=lambda i: signals[i].combination is None)
+    row = 0
+    for i in rows:
+        signal = signals[i]
+        is_state = signal.combination is None and signal.state not in driven
+        source = integrated.states if is_state else integrated.outputs
+        row_of_signal = signal.state if is_state else row
+        values[i] = source[row_of_signal]
+        for j in range(len(quantities)):
+            place = (
+                places.derivative(j) + row_of_signal
+                if is_state
+                else count * (1 + j) + row_of_signal
+            )
+            derivatives[i, j] = source[place] / scale[j]
+        row += not is_state
+    for lack in lacks:
+        behind = (
+            integrated.time > lack.time if lack.time == times[0] else integrated.time >= lack.time
+        )
+        without = [q.name in lack.with_respect_to for q in quantities]
+        derivatives[:, np.outer(without, behind)] = np.nan
+    rest = ((0, 0), (0, times.size - integrated.time.size))
+    values = np.pad(values, rest, constant_values=np.nan)
+    derivatives = np.pad(derivatives, ((0, 0), *rest), constant_values=np.nan)
+    return SensitivityResponse(
+        time=times, signals=tuple(s.name for s in signals),
+        with_respect_to=tuple(q.name for q in quantities), values=values,
+        derivatives=derivatives, scale=scale, missing=tuple(lacks),
+        statistics=integrated.statistics,
+    )  # fmt: skip
 
 
 @as_annotated

@@ -19,11 +19,9 @@ from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
-from .causes import at_once
-from .directions import Direction, SomeRows, Taken, rows_replaced
-from .moving_times import TimesThatMove
+from .directions import Direction, SomeRows, Taken, at_once, rows_replaced
+from .moving_times import Returning, TimesThatMove
 from .names import StatePlaces
-from .returning import Returning
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
 from .turns import DrivenMemories

@@ -26,7 +26,7 @@ class Sent(IntEnum):
     """What is sent through each delay next to its signal; each has what those before it have."""
 
     DERIVATIVES = 0
-    JUMPS = 1  # their number, heights and times, see `returning`
+    JUMPS = 1  # their number, heights and times, see `moving_times`
     RATES = 2  # of the signal: by its delay is differentiated, or a condition reads it
     TURNS = 3  # what is needed where a memory behind the delay reverses
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import nlctl
 from nlctl.analysis.loop_record import loop_values
 from nlctl.analysis.lyapunov import certify, read_parts
-from nlctl.analysis.lyapunov.loop.same_loop import check_same, points_around
+from nlctl.analysis.lyapunov.loop.checked import check_same, points_around
 from nlctl.analysis.response_of_loop import check_response
 from nlctl.blocks import Block
 from nlctl.diagrams import leaves, overridden

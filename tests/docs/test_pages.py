@@ -12,7 +12,7 @@ from rows import each_row
 import nlctl
 from nlctl.analysis.lyapunov.nussbaum.long_run import long_run
 from nlctl.analysis.paper import expectations
-from nlctl.analysis.paper.reference_run import AGREE, read_record
+from nlctl.analysis.paper.evidence import AGREE, read_record
 
 EXPLANATION = ROOT / "docs" / "explanation"
 PAGES = sorted(path.name for path in EXPLANATION.glob("*.md"))

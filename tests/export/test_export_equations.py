@@ -116,7 +116,7 @@ EXPORTS = {
         nlctl.interconnect([system], inputs=[], outputs=["x"], name="loop"), "s", dt=0.1,
         method="euler",
     ),
-    "fmu": lambda system: nlctl.export.fmi.reading.read_model(system, {}, {}, "s", 1.0, 1e-6),
+    "fmu": lambda system: nlctl.export.fmi.archive.read_model(system, {}, {}, "s", 1.0, 1e-6),
 }  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from fmi_models import MODELS, linear, simulated
 import nlctl
 from nlctl.errors import CompileError, ParameterError, UnknownNameError, UsageError
 from nlctl.export import fmu
-from nlctl.export.fmi.reading import read_model
+from nlctl.export.fmi.archive import read_model
 from nlctl.export.fmi.source import sources, token_of
 
 pytestmark = pytest.mark.export
@@ -381,7 +381,7 @@ def test_wide_registers_compute_the_same_bits(written, tmp_path):
 
 def test_what_the_compiler_refuses_leaves_no_file(tmp_path, monkeypatch):
     """A compiler that fails: its words are reported, and there is no half-written file."""
-    from nlctl.export.fmi import binaries
+    from nlctl.export.fmi import archive as binaries
 
     monkeypatch.setattr(binaries, "_COMMAND", ("-no-such-option",))
     with pytest.raises(CompileError, match="ziglang did not compile"):

@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 import nlctl
 from nlctl.analysis.intervals.machine import only_balls
 from nlctl.analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
-from nlctl.analysis.lyapunov.attraction.level import reach_of_level
+from nlctl.analysis.lyapunov.attraction.region import reach_of_level
 from nlctl.analysis.lyapunov.attraction.squares import PositiveCondition, positive_where
 from nlctl.errors import ParameterError
 

@@ -13,9 +13,8 @@ from scipy.optimize import brentq
 
 import nlctl
 from nlctl.analysis.lyapunov import Box, constants, premises, read_parts
-from nlctl.analysis.lyapunov.bounds.error_bounds import reference_bounds
-from nlctl.analysis.lyapunov.bounds.final_bound import KAPPA
-from nlctl.analysis.lyapunov.closure import FARTHEST, StateReach, closed_set, least_bound
+from nlctl.analysis.lyapunov.bounds.error_bounds import KAPPA, reference_bounds
+from nlctl.analysis.lyapunov.conclusions import FARTHEST, StateReach, closed_set, least_bound
 from nlctl.params import equation_arguments
 
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from nlctl.analysis.recheck.digits import exact_text, text_above, text_below
+from nlctl.analysis.recheck.integers import exact_text, text_above, text_below
 
 
 def test_text_lies_on_the_side_that_claims_no_more():

@@ -11,7 +11,7 @@ from nlctl.analysis.intervals.written import operations
 from nlctl.analysis.recheck import Refuted
 from nlctl.analysis.recheck.equations import WrittenEquation
 from nlctl.analysis.recheck.integers import Interval
-from nlctl.analysis.recheck.products import as_equation, multiplied_out, plus
+from nlctl.analysis.recheck.reference_model import as_equation, multiplied_out, plus
 
 NAMES = ("x", "y")
 FUNCTIONS = {

@@ -12,7 +12,7 @@ from numba.core import config
 
 import nlctl
 from nlctl.analysis.paper import CASES, checks
-from nlctl.analysis.reproductions.cases import PaperRun, numbers_of
+from nlctl.analysis.reproductions.paper import PaperRun, numbers_of
 from nlctl.native import Status
 from nlctl.native.integrate.methods.tsit5 import TSIT5
 from nlctl.native.machine.store import cache_folder

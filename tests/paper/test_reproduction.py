@@ -15,7 +15,7 @@ from nlctl.analysis.paper import (
     expectations,
     sample_times,
 )
-from nlctl.analysis.reproductions.cases import PaperRun, numbers_of, simulate_case, simulate_cases
+from nlctl.analysis.reproductions.paper import PaperRun, numbers_of, simulate_case, simulate_cases
 
 CASE = {case.key: case for case in CASES}
 

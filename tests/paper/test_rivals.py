@@ -13,7 +13,7 @@ from tuning import evolved_gains
 
 import nlctl
 from nlctl.analysis.metrics import Metric, absolute_integral, peak
-from nlctl.analysis.paper.page.rivals import rivals_section
+from nlctl.analysis.paper.page.closing import rivals_section
 from nlctl.analysis.paper.rivals import (
     KNOWLEDGE,
     RIVAL_ACTUATORS,

@@ -6,7 +6,7 @@ import pytest
 
 from nlctl import paper
 from nlctl.analysis.paper.controllers import compared_controllers
-from nlctl.analysis.paper.page.sampling import sampling_section
+from nlctl.analysis.paper.page.closing import sampling_section
 from nlctl.analysis.paper.sampling_limits import (
     QUANTITIES,
     SAMPLING_RECORD,

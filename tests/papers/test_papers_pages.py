@@ -8,10 +8,8 @@ from places import ROOT
 
 import nlctl
 from nlctl.analysis.papers import named_paper, paper_names
-from nlctl.analysis.reproductions.cases import simulate_cases
-from nlctl.analysis.reproductions.page import compose_paper, paper_page
-from nlctl.analysis.reproductions.paper import FoundNumber, Statement
-from nlctl.analysis.reproductions.sections import found_numbers
+from nlctl.analysis.reproductions.page import compose_paper, found_numbers, paper_page
+from nlctl.analysis.reproductions.paper import FoundNumber, Statement, simulate_cases
 
 SIBLINGS = [name for name in paper_names() if name != "lv_2017"]
 REFUTED = {  # what is read somewhere and does not hold

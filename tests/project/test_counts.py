@@ -51,8 +51,8 @@ def counts(tree, plural):
 
 
 SEVERAL = {  # never one: of a fixed size, or another text is written for one
-    ("nlctl.analysis.paper.page.claims", "total"),
-    ("nlctl.analysis.paper.page.rivals", "rows['samples'].iloc[0]"),
+    ("nlctl.analysis.paper.page.report", "total"),
+    ("nlctl.analysis.paper.page.closing", "rows['samples'].iloc[0]"),
     ("nlctl.analysis.report.outline", "total"),
     ("nlctl.analysis.robustness.uncertainty.design", "rows"),
     ("nlctl.analysis.robustness.uncertainty.design", "columns"),

@@ -11,7 +11,7 @@ from rows import each_row
 from nlctl.analysis.lyapunov.lines import LineStatus
 from nlctl.analysis.report.outline import ANSWERS
 from nlctl.analysis.robustness.stl.text import parse_formula
-from nlctl.analysis.robustness.uncertainty.quantity import QUANTILES
+from nlctl.analysis.robustness.uncertainty.space import QUANTILES
 from nlctl.analysis.studies import StudyError, read_study
 from nlctl.analysis.studies.file.schema import Law
 from nlctl.analysis.studies.kinds import KINDS

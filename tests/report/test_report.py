@@ -26,7 +26,7 @@ from nlctl.analysis.report import (
     render_json,
     write_report,
 )
-from nlctl.analysis.reproductions.cases import PaperRun
+from nlctl.analysis.reproductions.paper import PaperRun
 from nlctl.host.files import replace_file
 
 

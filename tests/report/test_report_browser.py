@@ -11,8 +11,7 @@ from test_report import made_up_runs
 from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
 
-from nlctl.analysis.pages.compared import Compared, comparison_page
-from nlctl.analysis.pages.trend import trend_figure
+from nlctl.analysis.pages.compared import Compared, comparison_page, trend_figure
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import (
     Claim,

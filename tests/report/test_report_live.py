@@ -17,8 +17,8 @@ from nlctl.analysis.report import Figure, Report, Section, render_html, write_re
 from nlctl.analysis.report.browser import BROWSERS
 from nlctl.analysis.reproductions.live import with_parts_live
 from nlctl.analysis.robustness import Requirement
+from nlctl.analysis.robustness.stl.spec import violation_time
 from nlctl.analysis.robustness.stl.text import parse_formula
-from nlctl.analysis.robustness.stl.violation_time import violation_time
 from nlctl.errors import ParameterError
 
 pytestmark = pytest.mark.browser

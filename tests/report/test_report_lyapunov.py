@@ -19,20 +19,21 @@ from nlctl.analysis.lyapunov.loop.signals import equality, inequality
 from nlctl.analysis.lyapunov.nussbaum.long_run import LongRun, long_run
 from nlctl.analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
 from nlctl.analysis.pages import proof as ledger_text
-from nlctl.analysis.pages.notation import formulas
+from nlctl.analysis.pages.proof import formulas
 from nlctl.analysis.paper import BOUND
 from nlctl.analysis.paper.burst import through_the_burst
-from nlctl.analysis.paper.evidence import FarRuns, evidence, far_runs_in_background
-from nlctl.analysis.paper.figures import after_burst
-from nlctl.analysis.paper.page import proof_text as text
-from nlctl.analysis.paper.page.proof import lyapunov_sections
-from nlctl.analysis.paper.page.proof_text import LONG_RUN
-from nlctl.analysis.paper.page.report import paper_report
-from nlctl.analysis.paper.reference_run import (
+from nlctl.analysis.paper.evidence import (
     AGREE,
+    FarRuns,
     continued,
+    evidence,
+    far_runs_in_background,
     read_record,
 )
+from nlctl.analysis.paper.figures import after_burst
+from nlctl.analysis.paper.page import proof as text
+from nlctl.analysis.paper.page.proof import LONG_RUN, lyapunov_sections
+from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import (
     Figure,
     Paragraph,

@@ -35,9 +35,13 @@ from nlctl.analysis.robustness.stl.spec import FAILED
 from nlctl.analysis.studies import load_result, read_study, run
 from nlctl.analysis.studies.kind import headed, unanswered
 from nlctl.analysis.studies.kinds import KINDS
-from nlctl.analysis.studies.page.deviations import deviations_table
-from nlctl.analysis.studies.page.running import running
-from nlctl.analysis.studies.page.text import margin_text, violate, without_assumptions
+from nlctl.analysis.studies.page import (
+    deviations_table,
+    margin_text,
+    running,
+    violate,
+    without_assumptions,
+)
 from nlctl.errors import UsageError
 from nlctl.plotting.bands import upper_envelope
 

@@ -6,9 +6,9 @@ import pytest
 from command_line import nlctl_here
 
 from nlctl.analysis import figures
-from nlctl.analysis.pages.trend import trend_figure
+from nlctl.analysis.pages.compared import trend_figure
 from nlctl.analysis.report import Claim, Headline, Report, write_gallery, write_report
-from nlctl.analysis.report.trends import Revision, trends
+from nlctl.analysis.report.changes import Revision, trends
 
 
 def claim(text, status, margin="", ids=()):

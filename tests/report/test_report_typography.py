@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rows import each_row
 from test_report_page import HOSTILE
 
-from nlctl.analysis.pages.notation import formulas
+from nlctl.analysis.pages.proof import formulas
 from nlctl.analysis.report.mathml import inline, spoken
 from nlctl.analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plain_text
 

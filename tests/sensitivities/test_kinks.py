@@ -6,7 +6,7 @@ import pytest
 from closed_form_runs import block
 
 import nlctl
-from nlctl.sensitivities.run import _Kept
+from nlctl.sensitivities.response import _Kept
 
 
 def jumps(law, params):

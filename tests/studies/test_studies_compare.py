@@ -7,7 +7,7 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from nlctl.analysis.robustness.runs.identity import differences_of
+from nlctl.analysis.robustness.runs.store import differences_of
 from nlctl.analysis.studies import read_study, run
 
 SEARCHED = f"""{HEAD}{ROWS}

@@ -8,8 +8,8 @@ from rows import each_row
 
 from nlctl.analysis.pages.study.report import study_report
 from nlctl.analysis.robustness import Requirement
+from nlctl.analysis.robustness.stl.spec import violation_time
 from nlctl.analysis.robustness.stl.text import parse_formula
-from nlctl.analysis.robustness.stl.violation_time import violation_time
 from nlctl.analysis.studies import StudyError, load_result, plan, read_study, run
 from nlctl.analysis.studies.replay import replay
 

@@ -9,7 +9,7 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from nlctl.analysis.robustness.runs import identity
+from nlctl.analysis.robustness.runs import store as identity
 from nlctl.analysis.studies import RunFolderError, load_result, read_study, run
 from nlctl.analysis.studies.sealed import read_json, write_json
 

@@ -27,7 +27,7 @@ from test_studies_trust import (
 )
 
 from nlctl.analysis.studies import StudyError, load_result, read_study, replay, run
-from nlctl.analysis.studies.code.record import record_file
+from nlctl.analysis.studies.code.rule import record_file
 from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
 
 
@@ -77,7 +77,7 @@ ARGUMENTS = {  # functions of others, with what makes them dangerous
     "nlctl.analysis.studies.resolve:named_function": 'name = "{0}/evil.py:loop", folder = "/"',
     "nlctl.analysis.studies.resolve:option": 'value = 1, folder = "/"',
     "nlctl.analysis.studies.code.loading:load_file": 'path = "{0}/evil.py"',
-    "nlctl.analysis.studies.code.record:remember": "statements = []",
+    "nlctl.analysis.studies.code.rule:remember": "statements = []",
     "nlctl.analysis.studies:read_study": 'path = "{0}/evil.toml", trust = true',
     "nlctl.analysis.studies.folder:remove_run": 'folder = "{0}"',
 }

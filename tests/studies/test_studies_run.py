@@ -32,7 +32,7 @@ from nlctl.analysis.studies import (
 )
 from nlctl.analysis.studies.file.schema import keyed
 from nlctl.analysis.studies.folder import load_finding, load_run, save_finding
-from nlctl.analysis.studies.intact.contents import seal
+from nlctl.analysis.studies.intact import seal
 from nlctl.analysis.studies.sealed import origin_key
 from nlctl.errors import ParameterError, UnknownNameError
 

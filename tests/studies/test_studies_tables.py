@@ -15,7 +15,7 @@ from studies_example import HEAD, write
 from nlctl.analysis.report import write_gallery
 from nlctl.analysis.robustness.runs.store import read_parquet
 from nlctl.analysis.studies import RunFolderError, read_study, run, verify
-from nlctl.analysis.studies.intact.contents import check_page, recorded_print
+from nlctl.analysis.studies.intact import check_page, recorded_print
 from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
 from nlctl.errors import UsageError
 

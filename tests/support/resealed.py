@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from nlctl.analysis.robustness.runs import store
-from nlctl.analysis.studies.intact.contents import _rows, _tables
+from nlctl.analysis.studies.intact import _rows, _tables
 from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
 
 

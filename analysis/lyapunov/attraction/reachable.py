@@ -21,7 +21,7 @@ from nlctl.upstream.systems import System
 from nlctl.wording import counted
 
 from ...intervals.box import Box
-from ...recheck.digits import exact_text, text_below
+from ...recheck.integers import exact_text, text_below
 from .motion import motion_of
 
 _THREADS = 2

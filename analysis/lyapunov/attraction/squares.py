@@ -21,7 +21,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx
 from nlctl.expressions.graph import Expr, Untraceable, needed
 from nlctl.native.enclosures.scalars import scalar_expressions
 
-from ...intervals.exact_matrices import is_positive_definite
+from ...intervals.normal_form import is_positive_definite
 from ..convex import ConeLimit, at_most, equal, minimizer, semidefinite
 
 __all__ = ["PositiveCondition", "Term", "monomial_terms", "polynomials_of", "positive_where"]

@@ -93,13 +93,10 @@ def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: object, t: obje
         q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
     except Undecided:
         return rest
-    low, high = (_excess(end, k) for end in (q.lower(), q.upper()))
+    ends = (q.lower(), q.upper())
+    low, high = ((e - k[1]).max(arb(0)) + (e - k[0]).min(arb(0)) for e in ends)
     sharper = as_ball(u).value * low.union(high) + arb(0).union(start)
     if not rest.value.overlaps(sharper):  # answers that contradict each other: nobody goes this way
         return rest
     value = common(rest.value, sharper)
     return Ball(value, (arb(0, "inf"),) * len(as_ball(u).gradient))
-
-
-def _excess(q: arb, k: tuple[float, float]) -> arb:
-    return (q - k[1]).max(arb(0)) + (q - k[0]).min(arb(0))

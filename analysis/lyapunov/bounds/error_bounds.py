@@ -2,6 +2,10 @@
 
 r = (d/dt + p_1) ... (d/dt + p_{n-1}) e_1 is a chain of first-order filters, so that |r| <= C for
 all time bounds every e_i, and with the reference every x_i.
+
+The final bound of the proof: V(0), (31), (34)-(36), as formulas of the controller's gains.
+
+Each formula is written once and serves floats, balls and polynomials alike.
 """
 
 from __future__ import annotations
@@ -10,6 +14,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +24,69 @@ from flint import arb, fmpz_poly
 from nlctl.errors import ParameterError
 from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
+
+KAPPA = 0.2785  # bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """Gains of the controller (23)-(25), and where it starts."""
+
+    beta: float  # gain of r, (23)
+    # adaptation gain and sigma-modification of W_hat, (25)
+    Gamma: float
+    sigma_1: float
+    # adaptation gain, sigma-modification and width of the robust term, (25)
+    gamma: float
+    sigma_2: float
+    tau: float
+    # r(0) and delta_hat(0)
+    r_0: float
+    delta_hat_0: float
+    W_hat_0: tuple[float, ...]  # w_hat(0); empty where there is no network
+    # width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta + 0.2785
+    # b; 0 for eta of (23)
+    b: float = 0.0
+
+
+def total_error(G_max: Any, eps_u: Any, d: object, eps: object) -> Any:
+    """Return delta* = G_max eps_u* + d* + eps*, the bound of all errors in (20)."""
+    return G_max * eps_u + d + eps
+
+
+def alpha_1(gains: Gains) -> float:
+    """Return alpha_1 = min{2 beta, sigma_1 / lambda_max(Gamma^-1), sigma_2 gamma}, (31)."""
+    # Without a network its term drops out.
+    rates = [2 * gains.beta, gains.sigma_2 * gains.gamma]
+    if gains.W_hat_0:
+        rates.append(gains.sigma_1 * gains.Gamma)
+    return float(np.min(rates))
+
+
+def alpha_0(gains: Gains, delta: Any, W_squared: Any) -> Any:
+    """Return alpha_0 = 0.2785 (tau delta* + b) + sigma_1 |W|^2 / 2 + sigma_2 delta*^2 / 2, (31)."""
+    return (
+        KAPPA * gains.tau * delta
+        + KAPPA * gains.b
+        + 0.5 * gains.sigma_1 * W_squared
+        + 0.5 * gains.sigma_2 * delta**2
+    )
+
+
+def initial_V(gains: Gains, delta: Any, W_error_squared: Any) -> Any:  # noqa: N802
+    """Return V(0) of (21): r^2/2 + |W - W_hat|^2/(2 Gamma) + (delta* - delta_hat)^2/(2 gamma)."""
+    return (
+        0.5 * gains.r_0**2
+        + (0.5 / gains.Gamma) * W_error_squared
+        + (0.5 / gains.gamma) * (delta - gains.delta_hat_0) ** 2
+    )
+
+
+def final_bound(alpha_0: Any, alpha_1: float, V_0: object, Q: float) -> Any:
+    """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0."""
+    # With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
+    return np.sqrt(2 * (alpha_0 / alpha_1 + V_0 + Q))
+
 
 _ROUNDING = 1e-12  # added to what double precision has summed up
 _SAMPLES = 4000  # of a period
@@ -60,7 +128,8 @@ def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) ->
     for p in reversed(poles):
         previous = rows[0]
         rows.insert(0, [p * a + b for a, b in zip([*previous, 0], [0, *previous], strict=True)])
-    z = [abs(_dot(row, e0)) for row in rows]
+    products = ([a * b for a, b in zip(row, e0, strict=False)] for row in rows)
+    z = [abs(sum(terms, arb(0))) for terms in products]
     z[0] = C
     for k in range(1, n):
         z[k] = z[k].max(z[k - 1] / poles[k - 1])
@@ -76,10 +145,6 @@ def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) ->
     return tuple(
         sum((abs(c) * z[n - 1 - j] for j, c in enumerate(row)), arb(0)) for row in combinations
     )
-
-
-def _dot(row: Sequence[arb], values: Sequence[arb | float]) -> arb:
-    return sum((a * b for a, b in zip(row, values, strict=False)), arb(0))
 
 
 @functools.lru_cache(maxsize=32)

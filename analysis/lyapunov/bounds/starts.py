@@ -17,7 +17,7 @@ from nlctl.names import find_name
 from nlctl.params import as_numbers
 
 from ...intervals.box import Box
-from ...recheck.digits import exact_text
+from ...recheck.integers import exact_text
 
 LEVEL = "V"
 _CORNERS = 12  # of sides that have a width: beyond, corners are drawn

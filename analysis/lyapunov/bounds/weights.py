@@ -22,7 +22,7 @@ from nlctl.params import equation_arguments
 
 from ...intervals.branch_and_bound import Box, Range, enclose
 from ..convex import at_most, minimizer
-from .final_bound import Gains, alpha_0, alpha_1, initial_V
+from .error_bounds import Gains, alpha_0, alpha_1, initial_V
 from .sector import plant_terms
 
 LARGEST_NORM = 1e5  # |W|^2 = 1e10 has a rounding error of 1e-6 in double precision

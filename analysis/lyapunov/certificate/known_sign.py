@@ -14,7 +14,7 @@ No Nussbaum function and no Lemma 1 take part.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,18 +23,16 @@ from flint import arb
 from nlctl import controllers
 from nlctl.attributes import described_record
 from nlctl.references import SumOfSines
-from nlctl.upstream.systems import System
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
-from ...recheck.digits import text_above
-from ..bounds.final_bound import alpha_0, alpha_1, initial_V
+from ...recheck.integers import text_above
+from ..bounds.error_bounds import alpha_0, alpha_1, initial_V
 from ..loop.checked import NOTHING_SUPPOSED, Supposed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
 from ..proofs import filtered
-from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
-from ..proofs.result import FROM_STARTS, Row, per_second
-from ..proofs.saved import Content
+from ..proofs.kind import Closed, ProofKind, Subject, wider, without_end
+from ..proofs.result import FROM_STARTS, Content, Row, per_second
 
 _PROVED_FOR = {
     "reference": (SumOfSines,),
@@ -131,10 +129,6 @@ def read_known_sign(loop: Any, given: Supposed = NOTHING_SUPPOSED) -> KnownSignL
     )
 
 
-def _begin(loop: System, options: ProofOptions) -> Subject:
-    return filtered.subject_of(read_known_sign(loop, options), options, options.u_max)
-
-
 def _region(subject: Subject, level: arb) -> filtered.Demand:
     C = wider(upper(level), subject.tol)
     return filtered.demand(subject.loop, subject.split, C, tol=subject.tol)
@@ -161,10 +155,6 @@ def _bound(subject: Subject, need: filtered.Demand) -> _BoundOfR:
     if least > 0:
         doubt = f"N_0 = {N_0:g} is below 1/(k_1 G_min) = {1 / least:.6g}"
     return dataclasses.replace(bound, doubt=doubt)
-
-
-def _endless(need: filtered.Demand, iterations: Sequence[float]) -> str:
-    return "" if iterations[-1] < _LIMIT else without_end("C_0(C)", iterations)
 
 
 def _largest_input(subject: Subject, need: filtered.Demand, bound: _BoundOfR) -> float:
@@ -194,10 +184,14 @@ KNOWN_SIGN = ProofKind(
     result=KnownSignCertificate,
     fits=lambda loop: has_law(loop, controllers.KnownSignLaw),
     bounded="|r|",
-    begin=_begin,
+    begin=lambda loop, options: filtered.subject_of(
+        read_known_sign(loop, options), options, options.u_max
+    ),
     region=_region,
     bound=_bound,
-    endless=_endless,
+    endless=lambda need, iterations: (
+        "" if iterations[-1] < _LIMIT else without_end("C_0(C)", iterations)
+    ),
     largest_input=_largest_input,
     fields=_fields,
 )

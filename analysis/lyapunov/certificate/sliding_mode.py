@@ -24,14 +24,13 @@ from nlctl.controllers import FilteredError, SlidingModeLaw
 from nlctl.references import SumOfSines
 
 from ...intervals.branch_and_bound import upper
-from ...recheck.digits import text_above
+from ...recheck.integers import text_above
 from ..bounds.error_bounds import error_bounds
 from ..loop.checked import read_checked
 from ..loop.roles import Pieces, has_law
 from ..proofs import filtered
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider
-from ..proofs.result import FROM_STARTS, Row, per_second
-from ..proofs.saved import Content
+from ..proofs.result import FROM_STARTS, Content, Row, per_second
 
 _PIECES: Pieces = {
     "reference": ("yd", ()),

@@ -3,11 +3,17 @@
 The proof is about one loop: plant, actuator, reference and the paper's controller, each signal
 connected once, with gain 1.  Blocks are known by the signals that their records declare, whatever
 these are called in the diagram; every wire is read from python-control's own maps.
+
+What a loop consists of, and what has been seen of it before.
+
+Whatever was checked of a loop holds as long as its functions, wiring and values are the same.  A
+key of these sees whether they are; where no key sees everything nothing is remembered.
 """
 
 from __future__ import annotations
 
 import inspect
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,7 +25,7 @@ from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
-from nlctl.diagrams import Place, initial_state, interconnect, leaves, overridden
+from nlctl.diagrams import Place, initial_state, interconnect, leaves, overridden, places
 from nlctl.diagrams.points import values_now
 from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.checks import check_functions, check_sizes
@@ -28,8 +34,72 @@ from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import Around
 from nlctl.upstream.systems import System
 
-from ..bounds.final_bound import Gains
-from .content import Remembered
+from ...loop_record import facts_and_unseen, text_key, value_text
+from ..bounds.error_bounds import Gains
+
+_MOST = 1024  # checks that are remembered
+_RECORDS = ("spec", "current_spec")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopContent:
+    """What a loop consists of."""
+
+    # as of `nlctl.analysis.loop_record.loop_facts`
+    facts: Mapping[str, dict[str, str]] = field(repr=False)
+    # of all that python-control computes of it with the parameters of the run; empty where no
+    # key sees everything
+    key: str
+    # of its functions, and of what kinds of values they get; empty where `key` is
+    functions: str = ""
+
+
+UNREAD_CONTENT = LoopContent(facts={}, key="")
+
+
+class Remembered:
+    """Keys of the latest checks that were passed; an empty key stands for none."""
+
+    def __init__(self) -> None:
+        self._passed: OrderedDict[str, None] = OrderedDict()
+
+    def __contains__(self, key: str) -> bool:
+        return bool(key) and key in self._passed
+
+    def add(self, key: str) -> None:
+        """Note that a check was passed."""
+        if key:
+            self._passed[key] = None
+            while len(self._passed) > _MOST:
+                self._passed.popitem(last=False)
+
+
+def loop_content(
+    loop: ct.InterconnectedSystem, params: Mapping[str, Any] | None = None
+) -> LoopContent:
+    """Return what a loop consists of now."""
+    facts, unseen = facts_and_unseen(loop)
+    is_seen = not unseen and all(_is_plain(place.system) for place in places(loop))
+    values = {name: value_text(value) for name, value in (params or {}).items()}
+    if not is_seen:
+        return LoopContent(facts=facts, key="")
+    kinds = {n: v if type((params or {})[n]) is not float else "float" for n, v in values.items()}
+    return LoopContent(
+        facts=facts, key=text_key(repr((facts, values))), functions=text_key(repr((facts, kinds)))
+    )
+
+
+def _is_plain(system: object) -> bool:
+    """Whether a system computes what its class, its maps and its record say, and nothing else."""
+    fields = {name: value for name, value in vars(system).items() if name not in _RECORDS}
+    update, output = fields.pop("updfcn", None), fields.pop("outfcn", None)
+    if any(callable(value) for value in fields.values()):  # instead of a method
+        return False
+    if type(system) is Block:
+        spec = system.spec
+        return output is spec.output and (not spec.states or update is spec.update)
+    return type(system) is ct.InterconnectedSystem
+
 
 _PURE = Remembered()  # loops whose functions were read
 Pieces = Mapping[str, tuple[str, tuple[str, ...]]]

@@ -31,10 +31,10 @@ from nlctl.wording import counted
 
 from ...response_of_loop import own_parameters
 from ..bounds.decomposition import Decomposition
-from ..bounds.final_bound import Gains, alpha_1
+from ..bounds.error_bounds import Gains, alpha_1
+from .checked import check_same, points_around
 from .instrumented import observed
 from .roles import Parts, declared, read_parts
-from .same_loop import check_same, points_around
 from .signals import Margin, Signals, equality, signals_of
 
 SAMPLING_INTERVAL = 4e-3  # s, sampling interval of a run that is given by its horizon

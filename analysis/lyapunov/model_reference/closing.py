@@ -33,15 +33,18 @@ from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.clipped import clipped_split
 from ..bounds.decomposition import Decomposition, decompose
-from ..loop.checked import disturbed
-from ..loop.same_loop import points_around
+from ..loop.checked import disturbed, points_around
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
-from .decrease import Decrease, decrease, outside_ball, sigma_of
-from .matching import Matching, matching
+from .decrease import Decrease, Region, decrease, outside_ball, region, sigma_of
+from .matching import (
+    Matching,
+    ModelReferenceLoop,
+    is_model_reference,
+    matching,
+    read_model_reference,
+)
 from .model_certificate import ModelReferenceCertificate
-from .model_loop import ModelReferenceLoop, is_model_reference, read_model_reference
 from .quadratic_form import ball
-from .region import Region, region
 
 _LIMIT = 1e12  # a bound of V beyond which the iteration counts as without end
 _TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it falls by more

@@ -17,15 +17,24 @@ from nlctl.wording import counted
 
 from ...intervals.normal_form import exact
 from ...intervals.written import operations
-from ...recheck.digits import text_above
+from ...recheck.integers import text_above
 from ..bounds.decomposition import Decomposition
 from ..loop.checked import ADDED
-from ..proofs.result import FROM_STARTS, Certificate, Row, per_second, rows_of_split
-from ..proofs.saved import Content, equation_content, split_content, starts_content, texts
-from .decrease import Decrease, decrease, sigma_of
+from ..proofs.result import (
+    FROM_STARTS,
+    Certificate,
+    Content,
+    Row,
+    equation_content,
+    per_second,
+    rows_of_split,
+    split_content,
+    starts_content,
+    texts,
+)
+from .decrease import Decrease, decrease, region, sigma_of
 from .matching import Matching
 from .quadratic_form import QuadraticForm
-from .region import region
 
 _ALPHA_0 = "q D^2/(1 - alpha_1/mu) + lambda sigma |W|^2/(2 - alpha_1/(Gamma sigma))"
 

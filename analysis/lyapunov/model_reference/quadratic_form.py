@@ -19,8 +19,7 @@ from scipy.linalg import eigh
 
 from nlctl.errors import DiagramError
 
-from ...intervals.exact_matrices import exact_matrix, is_positive_definite, rational
-from ...intervals.normal_form import exact
+from ...intervals.normal_form import exact, exact_matrix, is_positive_definite, rational
 
 _SHRUNK = 1 - 1e-9  # of the least eigenvalue in floating point, to be proved a lower bound
 

@@ -21,14 +21,27 @@ from ...intervals.branch_and_bound import enclose_relatively, upper
 from ...intervals.machine import Readable
 from ...intervals.normal_form import exact
 from ..bounds.decomposition import Decomposition, decompose
-from ..bounds.error_bounds import error_bounds, filter_poles, initial_errors, reference_bounds
-from ..bounds.final_bound import total_error
+from ..bounds.error_bounds import (
+    error_bounds,
+    filter_poles,
+    initial_errors,
+    reference_bounds,
+    total_error,
+)
 from ..bounds.sector import quotient_function, range_of_quotient
-from ..loop.checked import ADDED, CheckedLoop, disturbed
-from ..loop.plant_form import Acceleration
+from ..loop.checked import ADDED, Acceleration, CheckedLoop, disturbed
 from .kind import ProofOptions, Subject
-from .result import Certificate, Row, per_second, rows_of_split
-from .saved import Content, equation_content, split_content, starts_content, texts
+from .result import (
+    Certificate,
+    Content,
+    Row,
+    equation_content,
+    per_second,
+    rows_of_split,
+    split_content,
+    starts_content,
+    texts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from flint import arb
 from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
-from ...recheck.digits import text_above, text_below
+from ...recheck.integers import text_above, text_below
 from ..bounds.decomposition import Decomposition, only_declared
 from ..loop.checked import Supposed
 from .result import Certificate, ProofResult

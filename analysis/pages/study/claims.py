@@ -9,9 +9,8 @@ from nlctl.errors import UsageError
 
 from ...report.document import Claim, Section, Table
 from ...robustness.statistics.guarantee import check_iid
-from ...studies.file.asked import Asked
-from ...studies.file.schema import keyed
-from ...studies.page.text import without_assumptions
+from ...studies.file.schema import Asked, keyed
+from ...studies.page import without_assumptions
 from ...studies.result import Finding, Result
 
 AT_ONCE = 2

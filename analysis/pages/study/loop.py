@@ -17,7 +17,6 @@ from ...report.document import Item, Paragraph, Section
 from ...robustness.runs.experiment import Prepared
 from ...studies.result import Result
 from ..diagram import diagram_sections
-from . import text as text
 
 
 @described_record(eq=False)
@@ -74,7 +73,7 @@ def loop_sections(loop: StudyLoop, result: Result) -> Iterator[Section]:
         yield Section(
             key="study_source",
             title=f"The source of the loop: {loop.file}",
-            items=[Paragraph(text=text.SOURCE, code=loop.source)],
+            items=[Paragraph(text="As it was when this page was made:", code=loop.source)],
             level=3,
             folded=True,
         )

@@ -12,20 +12,23 @@ from typing import Any
 from ...report.document import Figure, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
-from ...studies.file.asked import Varied
+from ...studies.file.schema import Varied
 from ...studies.kinds import KINDS
-from ...studies.page.running import running
-from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
+from ...studies.page import ASSUMED, assumptions_in, running, without_assumptions
 from ...studies.reading.own_kinds import STAND_IN
 from ...studies.result import LISTED, Finding, Result
 from ...studies.sealed import as_written
 from . import methods as how
-from . import text as text
 from .claims import claims, traceability, verdict
 from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
 
+_PART = (
+    "Short studies of what happens when parameters, initial states and disturbances differ from "
+    "the paper's. nlctl report STUDY.toml makes a whole report on one, and on longer studies; the "
+    "files reports/*.toml of nlctl are such studies."
+)
 OUTCOMES = {  # by the light
     "pass": "shown",
     "caution": "not shown yet",
@@ -163,7 +166,7 @@ def study_part(
     ]
     limits = dict.fromkeys(words for result, _ in studies for words in how.limits(result))
     return [
-        Section(key=key, title="Robustness", items=[Paragraph(text=text.PART), overview]),
+        Section(key=key, title="Robustness", items=[Paragraph(text=_PART), overview]),
         *parts,
         Section(
             key=f"{key}-limits",
@@ -181,7 +184,7 @@ def _brief(
     """Yield a study in short: what each analysis found, runs over time, and what it rests on."""
     asked = result.asked
     answers = Table(
-        caption=text.FOUND,
+        caption="Analyses of the loop, and their results.",
         columns=("asked", "found"),
         rows=[(_title(f, result), _sentence(f, asked[f.key])) for f in result.findings],
     )

@@ -14,14 +14,28 @@ from ... import figures as figures
 from ...report.document import History, Item, Paragraph, Table, captioned
 from ...robustness.search.evaluation import margins_of
 from ...robustness.stl.spec import violates
-from ...studies.page.tables import known
-from ...studies.page.text import clipped, margin_in_words, margin_text, status_text, violate
+from ...studies.page import clipped, known, margin_in_words, margin_text, status_text, violate
 from ...studies.result import Result
-from . import text as text
 from .claims import has_ids, refusal
 from .histories import Histories
 from .loop import Published
 
+_SPEC = (
+    "What is required of every run. A margin is the distance to the bound of a requirement, as a "
+    "share of that bound: 0.2 means that 20 % of it are left; a run violates the spec unless the "
+    "least of its margins is above 0."
+)
+_SPACE = (
+    "What is uncertain: nominal value, law, and the box that corners and searches stay in. "
+    "Everything else keeps its nominal value."
+)
+_METRICS_CAPTION = (
+    "Metrics of the runs. Missing: runs that did not reach their end; they are not in the other "
+    "columns."
+)
+_MARGINS_CAPTION = (
+    "Left: number of runs by margin. Right: share of the runs with at most that margin."
+)
 WORST = 10  # rows that are listed
 _PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
 
@@ -40,7 +54,7 @@ def setup_items(result: Result, published: Published | None = None) -> Iterator[
     )
     ids = has_ids(result)
     yield Table(
-        caption=text.SPEC,
+        caption=_SPEC,
         columns=("id",) * ids + ("requirement", "formula", "until (s)", "meaning"),
         rows=[
             (study.spec[str(key)].id,) * ids + (key, row["formula"], row["until"], row["meaning"])
@@ -48,7 +62,7 @@ def setup_items(result: Result, published: Published | None = None) -> Iterator[
         ],
     )
     yield Table(
-        caption=text.SPACE,
+        caption=_SPACE,
         columns=("quantity", "nominal", "unit", "law", "box from", "to"),
         rows=[*known(result.quantities, "nominal", "unit", "law", "low", "high")],
     )
@@ -65,7 +79,7 @@ def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     statuses = table["status"].astype(str)
     counts = statuses.value_counts().sort_index()
     yield Table(
-        caption=text.STATUS,
+        caption="How the runs ended. A run that did not reach its end violates the spec.",
         columns=("status", "runs", "share"),
         rows=[
             (status_text(name), int(n), f"{100 * n / len(table):.4g} %")
@@ -83,7 +97,7 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     yield _requirements(result, table)
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    caption = text.MARGINS_CAPTION + text.VIOLATIONS * bool(violated) + clipped(margins)
+    caption = _MARGINS_CAPTION + " Orange: violations." * bool(violated) + clipped(margins)
     yield captioned(
         f"{key}-margins",
         caption,
@@ -102,7 +116,7 @@ def _requirements(result: Result, table: pd.DataFrame) -> Table:
         share = f"{100 * violated / len(table):.4g} %"
         rows.append((key, violated, share, *map(margin_text, ends)))
     return Table(
-        caption=text.REQUIREMENTS,
+        caption="Margins by requirement; the spec is the least of them.",
         columns=("requirement", "violations", "share", "least margin", "median", "largest"),
         rows=rows,
     )
@@ -147,7 +161,7 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
         missing = values.size - there.size
         rows.append((key, about["meaning"], about["unit"], *ends, missing))
     return Table(
-        caption=text.METRICS_CAPTION,
+        caption=_METRICS_CAPTION,
         columns=("metric", "meaning", "unit", *_PARTS.values(), "missing"),
         rows=rows,
         folded=True,
@@ -186,13 +200,11 @@ def fan_items(histories: Histories, key: str) -> Iterator[Item]:
         shown=list(both)[: len(runs)],
         bands={}
         if histories.groups
-        else {f"{n}, nominal": _most(y) for n, y in histories.signals.items()},
+        else {  # ends of the band that holds 90 % of the rows at each time
+            f"{n}, nominal": (figures.quantile(y, 0.05, -np.inf), figures.quantile(y, 0.95, np.inf))
+            for n, y in histories.signals.items()
+        },
     )
-
-
-def _most(samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the band that holds 90 % of the rows at each time."""
-    return figures.quantile(samples, 0.05, -np.inf), figures.quantile(samples, 0.95, np.inf)
 
 
 def _bands(kept: Histories) -> str:

@@ -8,8 +8,7 @@ from nlctl import paper
 from nlctl.faults import NEVER, Fault, with_faults
 
 from ...report.document import History, Paragraph
-from ...reproductions.cases import PaperRun
-from ...reproductions.paper import MovedLoop, Paper, PaperFigure, Part
+from ...reproductions.paper import MovedLoop, Paper, PaperFigure, PaperRun, Part
 from .. import BOUND, CASES, HORIZON, TAIL, expectations
 from .. import figures as histories
 from ..reproduction import expected_statement

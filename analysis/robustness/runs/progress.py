@@ -72,12 +72,7 @@ class Progress:
 
 
 class Tally:
-    """Counts of the rows that are finished; chunks may come in any order.
-
-    Parameters
-    ----------
-    design : Design
-    """
+    """Counts of the rows that are finished; chunks may come in any order."""
 
     def __init__(self, design: Design) -> None:
         self.design = design

@@ -18,7 +18,7 @@ from nlctl.wording import counted, some_of
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design
-from ..uncertainty.quantity import Choice
+from ..uncertainty.space import Choice
 from .guarantee import clopper_pearson
 from .paired import Better, differences, mcnemar, wins
 

@@ -22,8 +22,7 @@ from nlctl.native import Compiled
 from nlctl.params import with_overrides
 from nlctl.upstream.control_internals import is_system
 
-from .quantity import SpaceError, Uncertain
-from .space import Space, combinations, ends, nominal, towards_nominal
+from .space import Space, SpaceError, Uncertain, combinations, ends, nominal, towards_nominal
 
 FEW = 10  # of up to so many quantities of one block all corners are tried
 

@@ -159,7 +159,8 @@ def _models_at(annotation: object, loc: KeyPath) -> list[type[BaseModel]]:
         for model in models:
             if part in model.model_fields:
                 inner += _models(model.model_fields[str(part)].annotation)
-        tagged = [m for m in models if part in get_args(_tag(m))]
+        kinds = [(m, m.model_fields.get("kind")) for m in models]
+        tagged = [m for m, kind in kinds if kind and part in get_args(kind.annotation)]
         models = inner or tagged or models  # a key of a dict, an index: the same models
     return models
 
@@ -169,10 +170,6 @@ def _meaning(model: type[BaseModel], loc: KeyPath) -> str:
     fields = [one.model_fields.get(str(loc[-1])) for one in _models_at(model, loc[:-1])]
     described = next((field.description for field in fields if field and field.description), "")
     return f": {described[0].lower()}{described[1:].rstrip('.')}" if described else ""
-
-
-def _tag(model: type[BaseModel]) -> Any:
-    return model.model_fields["kind"].annotation if "kind" in model.model_fields else None
 
 
 def _models(annotation: object) -> Iterator[type[BaseModel]]:

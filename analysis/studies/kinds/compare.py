@@ -28,13 +28,12 @@ from ...robustness import (
 )
 from ...robustness.statistics.comparison import Comparison, compare, crossed
 from ...robustness.statistics.paired import TRUSTED_ROWS
-from ...robustness.statistics.verdict import better_verdict
+from ...robustness.statistics.sequential import better_verdict
+from .. import page as text
 from ..build import choice, inputs_of, metrics_of
-from ..file.asked import Asked, Confidence, Names, Whole
-from ..file.schema import Choices
+from ..file.schema import Asked, Choices, Confidence, Names, Whole
 from ..kind import Ground, Kind, Setup, finding_of
-from ..page import text as text
-from ..page.tables import column_in_words, result_table
+from ..page import column_in_words, result_table
 from ..resolve import option
 from ..result import Finding, Result
 from .context import CLOPPER, HOLM

@@ -14,10 +14,10 @@ from ...report.document import Item, Table, captioned
 from ...robustness import bound_verdict, independent
 from ...robustness.search.degradation import degradation_curve
 from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
-from ..file.asked import Confidence, Flag, Size, Varied, Whole
+from .. import page as text
+from ..file.schema import Confidence, Flag, Size, Varied, Whole
 from ..kind import Ground, Kind, finding_of
-from ..page import text as text
-from ..page.text import margin_text
+from ..page import margin_text
 from ..result import Finding, Result
 from .context import CLOPPER
 

@@ -16,9 +16,9 @@ from ...report.document import Item, Paragraph, captioned
 from ...robustness import Space
 from ...robustness.search.failure_map import boundary, failure_map
 from ...robustness.stl.spec import violates
-from ..file.asked import Asked, Pair, Whole
+from ..file.schema import Asked, Pair, Whole
 from ..kind import Ground, Kind, finding_of
-from ..page.tables import known
+from ..page import known
 from ..result import Finding, Result
 
 _CAPTION = (

@@ -24,14 +24,12 @@ from ... import figures as figures
 from ...report.document import Figure, Item, Paragraph, Table, captioned
 from ...robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
 from ...robustness.runs.experiment import signals_of_rows
-from ...robustness.stl.spec import Requirement, violates
+from ...robustness.stl.spec import Requirement, ViolationTime, violates, violation_time
 from ...robustness.stl.text import parse_formula
-from ...robustness.stl.violation_time import ViolationTime, violation_time
 from ..build import faults_of
-from ..file.asked import Asked, Flag, Names, Size
+from ..file.schema import Asked, Flag, Names, Size
 from ..kind import Ground, Kind, Setup, finding_of
-from ..page import text as text
-from ..page.text import DID_NOT_END, margin_in_words, margin_text
+from ..page import DID_NOT_END, margin_in_words, margin_text
 from ..result import Finding, Result
 
 TOGETHER = 256  # unfinished runs that are simulated again in batches

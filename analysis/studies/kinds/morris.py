@@ -11,10 +11,10 @@ from nlctl.wording import counted
 from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Design, Space, elementary_effects, morris
-from ..file.asked import Asked, Whole
+from .. import page as text
+from ..file.schema import Asked, Whole
 from ..kind import Ground, Kind, finding_of
-from ..page import text as text
-from ..page.tables import column_in_words, result_table
+from ..page import column_in_words, result_table
 from ..result import Finding, Result
 from .context import response
 

@@ -12,9 +12,9 @@ from nlctl.wording import counted
 from ...report.document import Item
 from ...robustness import bound_verdict, violation_probability
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
-from ..file.asked import Asked, Confidence
+from ..file.schema import Asked, Confidence
 from ..kind import Ground, Kind, finding_of
-from ..page.running import running_items
+from ..page import running_items
 from ..result import Finding, Result
 from .context import CLOPPER, HOWARD, ROBBINS
 

@@ -10,13 +10,11 @@ from pydantic import Field
 
 from ... import figures as figures
 from ...report.document import Item, captioned
-from ...robustness.search.largest_scale import largest_scale
-from ...robustness.search.radius import robustness_radius
-from ..file.asked import Confidence, Size, Varied, Whole
+from ...robustness.search.radius import largest_scale, robustness_radius
+from .. import page as text
+from ..file.schema import Confidence, Size, Varied, Whole
 from ..kind import Ground, Kind, finding_of
-from ..page import text as text
-from ..page.deviations import found_rows
-from ..page.text import margin_in_words, margin_text
+from ..page import found_rows, margin_in_words, margin_text
 from ..result import Finding, Result
 from .context import AUGER, CLOPPER, HANSEN, SEARCHED
 

@@ -12,9 +12,9 @@ from nlctl.wording import counted
 from ...robustness import decide, test_verdict
 from ...robustness.runs.progress import until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
-from ..file.asked import Asked, Confidence
+from ..file.schema import Asked, Confidence
 from ..kind import Ground, Kind, finding_of
-from ..page.running import running_items
+from ..page import running_items
 from ..result import Finding
 from .context import HOWARD, ROBBINS
 

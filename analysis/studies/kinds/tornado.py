@@ -18,10 +18,10 @@ from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Experiment, Space, Uncertain, from_table, nominal
 from ...robustness.uncertainty.space import arguments_of_row
-from ..file.asked import Asked
+from .. import page as text
+from ..file.schema import Asked
 from ..kind import Ground, Kind, Setup, column, finding_of
-from ..page import text as text
-from ..page.tables import column_in_words, result_table
+from ..page import column_in_words, result_table
 from ..result import Finding, Result
 
 _CAPTION = (

@@ -33,11 +33,10 @@ from ...robustness import (
 )
 from ...robustness.runs.experiment import signals_of_rows
 from ...robustness.statistics.guarantee import rounded_up
-from ..file.asked import Asked, Confidence, Pair, Size, Whole
+from .. import page as text
+from ..file.schema import Asked, Confidence, Pair, Size, Whole
 from ..kind import Ground, Kind, Setup, finding_of
-from ..page import text as text
-from ..page.tables import column_in_words, result_table
-from ..page.text import DID_NOT_END, margin_text
+from ..page import DID_NOT_END, column_in_words, margin_text, result_table
 from ..result import Finding, Result
 from .context import CLOPPER
 

@@ -19,11 +19,10 @@ from ...robustness.search.confirmation import confirm
 from ...robustness.search.evaluation import margins_of
 from ...robustness.search.shrink import shrink
 from ...robustness.search.worst_case import worst_case
-from ..file.asked import Flag, Number, Varied, Whole
+from .. import page as text
+from ..file.schema import Flag, Number, Varied, Whole
 from ..kind import Ground, Kind, finding_of
-from ..page import text as text
-from ..page.deviations import found_rows
-from ..page.text import DID_NOT_END, margin_in_words, margin_text, status_text
+from ..page import DID_NOT_END, found_rows, margin_in_words, margin_text, status_text
 from ..result import Finding, Result
 from .context import AUGER, HANSEN, SEARCHED
 

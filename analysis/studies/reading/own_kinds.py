@@ -13,9 +13,8 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
 from ..code.rule import Grant, untrusted
-from ..file.asked import Asked
 from ..file.errors import Problem
-from ..file.schema import Study
+from ..file.schema import Asked, Study
 from ..file.toml import KeyPath, read_toml
 from ..kind import Ground, Kind, tagged
 from ..kinds import KINDS

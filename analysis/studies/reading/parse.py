@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
+from nlctl.names import check_known
 
 from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
 from ..file.errors import Problem, StudyError, located, place_text, schema_problems
@@ -25,6 +26,43 @@ from ..resolve import checked_definition
 from ..sealed import digest_of
 from .own_kinds import model_of, own_kinds
 from .validate import checked_experiment
+
+# a checkout has them in reports/, a wheel carries copies in its package
+FOLDERS = (Path(__file__).parents[3] / "reports", Path(__file__).parents[1] / "reports")
+
+
+@as_annotated
+def shipped(name: str) -> Path:
+    """Return the study file of this name, such as ``"example-1-quick"``.
+
+    Parameters
+    ----------
+    name : str
+        Without the ending.
+
+    Returns
+    -------
+    pathlib.Path
+        Of the file that is installed.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.studies import shipped
+    >>> shipped("example-1-quick").name
+    'example-1-quick.toml'
+    >>> shipped("example-1-quik")
+    Traceback (most recent call last):
+    nlctl.errors.UnknownNameError: unknown study 'example-1-quik'; nearest: 'example-1-quick', ...
+    """
+    studies = {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
+    check_known("study", name, studies)
+    return studies[name]
+
 
 _ROUNDS = 5  # mistakes may stand behind mistakes
 STAND_INS = {  # while the rest of a mistaken file is validated

@@ -34,9 +34,8 @@ from ..build import (
     size_mistakes,
     times,
 )
-from ..file.asked import Asked
 from ..file.errors import Problem
-from ..file.schema import RESERVED, Faulty, Study
+from ..file.schema import RESERVED, Asked, Faulty, Study
 from ..file.toml import KeyPath
 from ..kind import Setup
 from ..resolve import check_complete, loop_function, option, uncertain

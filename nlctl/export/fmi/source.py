@@ -14,7 +14,7 @@ from ...native.codegen.c.program import function_text
 from ...native.integrate.methods.tsit5 import TSIT5
 from ..source import INCLUDED
 from ..words import comment
-from .records import Model
+from .variables import Model
 
 _SHORT = 1e-7  # of the stop time: over which is seen whether a memory reverses
 _SHARED = ("common.h", "instance.h", "machine.h", "machine.c", "model.c", "sharp.h", "sharp.c",

@@ -2,34 +2,244 @@
 
 from __future__ import annotations
 
+import ctypes
+import functools
+import lzma
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import control as ct
+import llvmlite.binding as llvm
 import numpy as np
 
 from ... import native
 from ...annotations import as_annotated
 from ...attributes import described_record
 from ...errors import CompileError, ParameterError
+from ...expressions.graph import Expr, Graph
+from ...native.codegen.ir.program import program_text
+from ...native.codegen.plan import Store, split
+from ...native.codegen.rewrite import rewritten
+from ...native.diagram.parameters import length
 from ...native.driver import Course, prepared
+from ...native.equations.blocks import Equations
 from ...native.floats import with_every_float
 from ...native.integrate.log import Log
 from ...native.integrate.memory import arrays_alike, with_fields
 from ...native.integrate.methods.lu import WHOLE
 from ...native.integrate.methods.stiff import DIFFERENCES, stiff_method
-from ...native.integrate.state import LANE, Status
+from ...native.integrate.state import LANE, RUNNING, Status
+from ...native.lower import SAMPLE, planned
+from ...native.machine.finish import finished
 from ...native.run import Run
 from ...native.settings import Settings
 from ...responses.arguments import input_array, state_array
 from ..words import check_written_out, digest, parameter_values, refuse_if_any
-from .here import carried_out
-from .host import HOST, HOST_FUNCTIONS
-from .linking import PROVIDED, check_linker, linked
+from .linking import PROVIDED, check_linker, integrators_text, linked
 from .memory import memory_text, places_in_table
 from .rounding import rounding_alike
-from .timed import TimedProgram, timed_program
+
+_ROUNDS = 2000
+_PLACE = ctypes.c_void_p
+_NUMBER = ctypes.c_int64
+
+
+def carried_out(run: Run, text: str, names: Sequence[str], p: np.ndarray) -> Run:
+    """Return a run that has ended, by the functions of a page's program, which `text` is.
+
+    `run` stays as it was laid out.
+    """
+    task, code = run.task, finished(text, names)  # to be kept as long as its addresses are used
+    address = code.addresses
+    samples = [address[f"sample{k}"] for k in range(len(run.machine.samples))]
+    resets = [address["reset"]] if run.machine.resets else []
+    sharp = [address["sharp"]] if run.machine.sharp else []
+    c = np.zeros_like(task.p)
+    ctypes.CFUNCTYPE(None, _PLACE, _PLACE)(address["prepare"])(p.ctypes.data, c.ctypes.data)
+    task = with_fields(
+        task,
+        p=c,
+        clocks=with_fields(task.clocks, functions=np.array(samples, dtype=np.int64)),
+        resets=with_fields(task.resets, functions=np.array(resets, dtype=np.int64)),
+        sharp=with_fields(task.sharp, functions=np.array(sharp, dtype=np.int64)),
+    )
+    table, work = task.table.ctypes.data, run.work.table.ctypes.data
+    rhs, out, lane = address["rhs"], address["out"], run.work.lanes[0]
+    call = _integrators()
+    call("start", rhs, table, work)
+    run.work.samples[0] = run.work.x
+    tried = -1
+    while lane["status"] == RUNNING and lane["accepted"] + lane["rejected"] != tried:
+        tried = int(lane["accepted"] + lane["rejected"])
+        call("advance", rhs, 0, 0, table, work, _ROUNDS)
+    call("outputs", rhs, out, table, work)
+    return Run(machine=run.machine, task=task, work=run.work)
+
+
+@functools.cache
+def _integrators() -> Callable[..., None]:
+    """Return the integrators, called by their names and numbers."""
+    module = llvm.parse_assembly(integrators_text())
+    loaded = finished(lzma.compress(module.as_bitcode(), preset=1), ("start", "advance", "outputs"))
+    nothing = (_PLACE * 4)()
+
+    def call(name: str, *numbers: object) -> None:
+        kinds = [_NUMBER] * len(numbers)
+        function = ctypes.CFUNCTYPE(ctypes.c_int32, _PLACE, _PLACE, *kinds)
+        function(loaded.addresses[name])(nothing, ctypes.byref(nothing, 8), *numbers)
+
+    return call
+
+
+HEAP = 1 << 20  # bytes; the integrators ask for a few arrays of flags at a time
+
+HOST = f"""
+@host.heap = internal global [{HEAP} x i8] zeroinitializer, align 64
+@host.top = internal global i64 0
+@host.held = internal global i64 0
+@host.nothing = internal global [4 x i64] zeroinitializer, align 16
+
+; memory is taken from the heap one behind the other, and all of it is free again when none is held
+define ptr @malloc(i64 %size) nounwind {{
+  %begin = load i64, ptr @host.top
+  %behind = add i64 %begin, %size
+  %more = add i64 %behind, 63
+  %end = and i64 %more, -64
+  %fits = icmp ule i64 %end, {HEAP}
+  br i1 %fits, label %there, label %none
+there:
+  store i64 %end, ptr @host.top
+  %before = load i64, ptr @host.held
+  %now = add i64 %before, 1
+  store i64 %now, ptr @host.held
+  %place = getelementptr i8, ptr @host.heap, i64 %begin
+  ret ptr %place
+none:
+  ret ptr null
+}}
+
+define void @free(ptr %place) nounwind {{
+  %before = load i64, ptr @host.held
+  %now = sub i64 %before, 1
+  store i64 %now, ptr @host.held
+  %last = icmp eq i64 %now, 0
+  br i1 %last, label %empty, label %done
+empty:
+  store i64 0, ptr @host.top
+  br label %done
+done:
+  ret void
+}}
+
+declare void @prepare(ptr, ptr)
+declare void @timed.prepare(ptr, ptr)
+declare void @timed(ptr, ptr, ptr, ptr, ptr)
+declare i32 @start(ptr, ptr, i64, ptr, ptr)
+declare i32 @advance(ptr, ptr, i64, i64, i64, ptr, ptr, i64)
+declare i32 @outputs(ptr, ptr, i64, i64, ptr, ptr)
+
+define void @live_prepare() nounwind {{
+  call void @prepare(ptr @live.p, ptr @task.p)
+  ret void
+}}
+
+define i32 @live_start() nounwind {{
+  %rhs = ptrtoint ptr @rhs to i64
+  %status = call i32 @start(ptr @host.nothing, ptr @host.nothing, i64 %rhs, ptr @task, ptr @work)
+  ret i32 %status
+}}
+
+define i32 @live_advance(i32 %rounds) nounwind {{
+  %rhs = ptrtoint ptr @rhs to i64
+  %many = zext i32 %rounds to i64
+  %status = call i32 @advance(ptr @host.nothing, ptr @host.nothing, i64 %rhs, i64 0, i64 0,
+                              ptr @task, ptr @work, i64 %many)
+  ret i32 %status
+}}
+
+define i32 @live_outputs() nounwind {{
+  %rhs = ptrtoint ptr @rhs to i64
+  %out = ptrtoint ptr @out to i64
+  %status = call i32 @outputs(ptr @host.nothing, ptr @host.nothing, i64 %rhs, i64 %out,
+                              ptr @task, ptr @work)
+  ret i32 %status
+}}
+
+define void @live_timed() nounwind {{
+  call void @timed(ptr @live.t, ptr @live.t, ptr @live.t, ptr @live.c, ptr @live.s)
+  ret void
+}}
+
+define void @live_timed_prepare() nounwind {{
+  call void @timed.prepare(ptr @live.p, ptr @live.c)
+  ret void
+}}
+"""
+HOST_FUNCTIONS = (
+    "live_prepare", "live_start", "live_advance", "live_outputs", "live_timed",
+    "live_timed_prepare",
+)  # fmt: skip
+
+
+_STEADY = ("floor", "ceil", "trunc", "rint", "sign", "heaviside")  # they are their own levels
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimedProgram:
+    """Functions of time alone as ``timed(t, x, u, c, s)`` and ``timed.prepare(p, c)``."""
+
+    text: str  # LLVM's IR
+    rows: int  # of `c`
+    # so many first entries of `s` are constant between the times at which conditions switch
+    levels: int
+    # of products of sines where the angular frequencies of the factors are, begin and end
+    waves: tuple[tuple[tuple[int, int], ...], ...]
+    # where functions are that drive the equations, begin and end
+    pulses: tuple[tuple[int, int], ...]
+    size: int  # of `s`
+
+
+def timed_program(equations: Equations, layout: Any) -> TimedProgram:
+    """Return what a diagram has of functions of time alone."""
+    conditions, graph = equations.conditions, equations.graph
+    stores: list[Store] = []
+
+    def stored(expr: Expr) -> tuple[int, int]:
+        begin = sum(store.size for store in stores)
+        size = expr.size or 1
+        stores.extend(split(Store(array="s", row=begin, expr=graph.number(expr), size=size)))
+        return begin, begin + size
+
+    levels = [_level(graph, condition) for condition in conditions.of_time]
+    zero = graph.const(0.0)
+    for line in conditions.declared_of_time.values():  # at 0 a block may be on either side
+        levels += [graph.op(order, line, zero) for order in ("lt", "le")]
+    ends = [stored(level)[1] for level in levels]
+    waves = tuple(tuple(stored(slope) for slope in wave) for wave in conditions.waves)
+    pulses = tuple(stored(term) for term in conditions.pulses)
+    values, exact, _ = rewritten(graph, {"timed": stores})
+    functions, rows = planned(values, {"timed": SAMPLE}, length(layout))
+    named = {"timed.prepare": functions["prepare"], "timed": functions["timed"]}
+    return TimedProgram(
+        text=program_text(named, 1, exact), rows=max(rows, 1), levels=max(ends, default=0),
+        waves=waves, pulses=pulses, size=max(sum(store.size for store in stores), 1),
+    )  # fmt: skip
+
+
+def _level(graph: Graph, condition: Expr) -> Expr:
+    """Return a number that is constant between the switches of a condition."""
+    op, args = condition.op, condition.args
+    if condition.kind == "b" or op in _STEADY:
+        return condition
+    if op in ("remainder", "fmod"):
+        half = graph.op("mul", graph.const(0.5), graph.op("absolute", args[1]))
+        return graph.op("gt", graph.op("absolute", condition), half)
+    if op in ("minimum", "maximum"):
+        return graph.op("lt", *args)
+    return graph.op("lt", args[1] if op == "copysign" else args[0], graph.const(0.0))
+
 
 NOTED = 8192  # events of one run, for which there is room on a page
 _BREAKS = 4096  # switches of functions of time alone

@@ -8,7 +8,7 @@ import pytest
 
 import nlctl
 from nlctl.analysis.intervals.branch_and_bound import Box
-from nlctl.analysis.lyapunov.bounds.final_bound import (
+from nlctl.analysis.lyapunov.bounds.error_bounds import (
     Gains,
     alpha_0,
     alpha_1,

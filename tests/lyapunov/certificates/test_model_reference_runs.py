@@ -9,7 +9,7 @@ from mrac_loops import SINE, e_modification, first_order, projection, sigma, win
 import nlctl
 from nlctl.analysis.lyapunov import certify
 from nlctl.analysis.lyapunov.loop.roles import read_roles
-from nlctl.analysis.lyapunov.model_reference.model_loop import ADAPTIVE_PIECES
+from nlctl.analysis.lyapunov.model_reference.matching import ADAPTIVE_PIECES
 
 D, TIMES = 0.5, np.linspace(0, 60, 3001)
 INPUTS = {"w": D}

@@ -8,8 +8,8 @@ import pytest
 
 import nlctl
 from nlctl.analysis.lyapunov import certify
-from nlctl.analysis.lyapunov.loop import same_loop
-from nlctl.analysis.lyapunov.loop.content import loop_content
+from nlctl.analysis.lyapunov.loop import checked as same_loop
+from nlctl.analysis.lyapunov.loop.roles import loop_content
 from nlctl.errors import DiagramError
 
 SLOPE = 1.0

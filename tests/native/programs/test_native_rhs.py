@@ -11,8 +11,8 @@ from numba.core import config
 from plain_plan import compare, evaluated, interpreted
 
 import nlctl
+from nlctl.diagrams.addresses import may_read
 from nlctl.diagrams.places import leaves
-from nlctl.diagrams.reads import may_read
 from nlctl.errors import AlgebraicLoopError
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.diagram.schedule import schedule

@@ -25,9 +25,9 @@ from nlctl.analysis.robustness import (
     prepare,
     worst_case,
 )
-from nlctl.analysis.robustness.search.descent import _next_radius, single_steps
-from nlctl.analysis.robustness.search.descent import test_signals as signals_to_try
 from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest_nearby
+from nlctl.analysis.robustness.search.worst_case import _next_radius, single_steps
+from nlctl.analysis.robustness.search.worst_case import test_signals as signals_to_try
 
 T = np.arange(12.0)
 A, B = in_band("a", upper=1.0), in_band("b", lower=-1.0, upper=2.0, scale=1.5)

@@ -17,8 +17,7 @@ import nlctl
 from nlctl.analysis.robustness.search.worst_case import worst_case
 from nlctl.analysis.robustness.stl.formula import always, eventually, in_band
 from nlctl.analysis.robustness.stl.spec import Requirement, Spec, margins
-from nlctl.analysis.robustness.uncertainty.quantity import Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.space import Space, Uncertain
 
 DT = 0.01
 T = DT * np.arange(10001)

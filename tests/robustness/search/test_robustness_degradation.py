@@ -11,8 +11,7 @@ from scipy import stats
 import nlctl
 from nlctl.analysis.robustness.search.degradation import degradation_curve
 from nlctl.analysis.robustness.statistics.guarantee import clopper_pearson
-from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.space import Choice, Space, SpaceError, Uncertain
 
 D, BETA = 3, 1.2
 NORMAL = Space(

@@ -11,8 +11,7 @@ from small_systems import function
 
 import nlctl
 from nlctl.analysis.robustness.search.failure_map import boundary, failure_map
-from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.space import Choice, Space, SpaceError, Uncertain
 
 SPACE = Space(
     quantities=(

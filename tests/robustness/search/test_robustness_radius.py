@@ -14,13 +14,18 @@ from small_systems import function
 
 import nlctl
 from nlctl.analysis.robustness.runs.experiment import Experiment, evaluate, prepare
-from nlctl.analysis.robustness.search.largest_scale import largest_scale
-from nlctl.analysis.robustness.search.radius import robustness_radius, size_of
+from nlctl.analysis.robustness.search.radius import largest_scale, robustness_radius, size_of
 from nlctl.analysis.robustness.stl.formula import always, in_band
 from nlctl.analysis.robustness.stl.spec import Requirement, Spec
 from nlctl.analysis.robustness.uncertainty.lattice import corners
-from nlctl.analysis.robustness.uncertainty.quantity import QUANTILES, Choice, SpaceError, Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space, scaled
+from nlctl.analysis.robustness.uncertainty.space import (
+    QUANTILES,
+    Choice,
+    Space,
+    SpaceError,
+    Uncertain,
+    scaled,
+)
 
 
 def box(*sides):

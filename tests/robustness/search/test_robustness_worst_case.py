@@ -20,8 +20,7 @@ from nlctl.analysis.robustness.statistics.guarantee import NoGuaranteeError, vio
 from nlctl.analysis.robustness.stl.formula import always, in_band
 from nlctl.analysis.robustness.stl.spec import Requirement, Spec
 from nlctl.analysis.robustness.uncertainty.design import rows
-from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space, scaled
+from nlctl.analysis.robustness.uncertainty.space import Choice, Space, SpaceError, Uncertain, scaled
 
 
 def box(d, low=-1.0, high=2.0):

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from nlctl.analysis.robustness import Choice, Space, Uncertain, differences, independent, regional
-from nlctl.analysis.robustness.statistics import independence
-from nlctl.analysis.robustness.statistics.independence import independence_test
+from nlctl.analysis.robustness.statistics import sensitivity as independence
 from nlctl.analysis.robustness.statistics.paired import mean_is_trusted, median_interval
+from nlctl.analysis.robustness.statistics.sensitivity import independence_test
 
 LAWS = {  # of a difference: draws, mean, median
     "normal": (lambda r, n: r.normal(size=n), 0.0, 0.0),

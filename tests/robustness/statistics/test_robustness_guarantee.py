@@ -31,8 +31,7 @@ from nlctl.analysis.robustness.uncertainty.design import (
     sobol,
 )
 from nlctl.analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
-from nlctl.analysis.robustness.uncertainty.quantity import Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.space import Space, Uncertain
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5),))
 

@@ -21,8 +21,7 @@ from nlctl.analysis.robustness.statistics.paired import (
     wins,
 )
 from nlctl.analysis.robustness.uncertainty.design import independent, sobol
-from nlctl.analysis.robustness.uncertainty.quantity import Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.space import Space, Uncertain
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
 

@@ -19,8 +19,7 @@ from nlctl.analysis.robustness.statistics.sensitivity import (
 )
 from nlctl.analysis.robustness.stl.spec import unfinished_margin
 from nlctl.analysis.robustness.uncertainty.design import independent, sobol
-from nlctl.analysis.robustness.uncertainty.quantity import Choice, Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space, scaled
+from nlctl.analysis.robustness.uncertainty.space import Choice, Space, Uncertain, scaled
 
 
 def cube(d, low=0.0, high=1.0):

@@ -19,7 +19,7 @@ from nlctl.analysis.robustness import (
     test_verdict,
     violation_probability,
 )
-from nlctl.analysis.robustness.statistics.verdict import better_verdict
+from nlctl.analysis.robustness.statistics.sequential import better_verdict
 
 test_verdict.__test__ = False  # the analysis' name, not a test
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5),))

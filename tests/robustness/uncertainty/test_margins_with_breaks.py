@@ -6,7 +6,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
 
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, margin
-from nlctl.analysis.robustness.stl.violation_time import violation_time
+from nlctl.analysis.robustness.stl.spec import violation_time
 from nlctl.errors import ParameterError
 
 END = 10.0

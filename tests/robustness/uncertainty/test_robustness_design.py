@@ -22,8 +22,7 @@ from nlctl.analysis.robustness.uncertainty.design import (
     sobol,
 )
 from nlctl.analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
-from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from nlctl.analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.space import Choice, Space, SpaceError, Uncertain
 
 A = Uncertain(name="a", bounds=(1.0, 3.0), nominal=1.5)
 B = Uncertain(name="b", law=stats.norm(0, 2), nominal=0.0)

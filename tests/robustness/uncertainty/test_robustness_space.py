@@ -10,9 +10,11 @@ from scipy import stats
 
 import nlctl
 from nlctl.analysis.robustness.uncertainty.binding import diagrams, resolved
-from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
 from nlctl.analysis.robustness.uncertainty.space import (
+    Choice,
     Space,
+    SpaceError,
+    Uncertain,
     arguments,
     combinations,
     ends,

@@ -1,1 +1,0 @@
-"""Whether a run folder is intact: its sealed record, and the shapes of its files."""
