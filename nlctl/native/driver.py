@@ -93,11 +93,14 @@ def slid_from(
     progress: Callable[[float], object] | None = None,
 ) -> SlidRun:
     """Return a run that chatters again, along the conditions at which it does, if it may slide."""
+    settings = course.settings
+    if settings.method == "taylor":  # it has no ideal relays
+        settings = replace(settings, method="auto")
 
     def run(compiled: Compiled, x0: np.ndarray, p: np.ndarray) -> Trajectory:
-        return run_once(replace(course, compiled=compiled), x0, p, progress)
+        return run_once(replace(course, compiled=compiled, settings=settings), x0, p, progress)
 
-    if not course.settings.slide:
+    if not settings.slide:
         return SlidRun(compiled=course.compiled, p=p, reached=reached)
     return sliding(run, course.compiled, reached, (x0, p), float(np.ptp(course.times)))
 

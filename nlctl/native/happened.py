@@ -61,7 +61,7 @@ def _labelled(compiled: Compiled, conditions: Conditions) -> list[tuple[str, str
             names = [what, *[f"{what}: end of sliding"] * (count - 1)]
         labels += [(node.path, name) for name in names]
     for each in conditions.located:
-        names = numbered(in_words(each.what), each.rows)
+        names = numbered(word_of(each.what), each.rows)
         labels += [(each.block, name) for name in names]
     for node in nodes:
         count = count_guards(node)
@@ -69,7 +69,7 @@ def _labelled(compiled: Compiled, conditions: Conditions) -> list[tuple[str, str
     return labels
 
 
-def in_words(op: str) -> str:
+def word_of(op: str) -> str:
     """Return what an operation that switches is called."""
     return _WORDS.get(op, op)
 

@@ -29,7 +29,7 @@ from .diagram.schedule import stand_in
 from .equations.blocks import Equations
 from .equations.relays import slide_places
 from .equations.slides import changing_at, declared_functions, of_both_sides, others_of
-from .happened import in_words, row_labels
+from .happened import word_of, row_labels
 from .integrate.state import Status
 from .results import Trajectory
 
@@ -149,7 +149,7 @@ class _Around:
         block, _ = row_labels(self.compiled, self.read.conditions)[rows[0]]
         op = next(n.op for n, (a, b) in zip(changing, sides, strict=True) if a != b)
         slide = Slide(
-            what=(block, in_words(op)),
+            what=(block, word_of(op)),
             places=self._places([row - first for row in rows if row >= first]),
             declared=tuple(row for row in rows if row < first),
             sides=sides, integers=step is not None,
@@ -178,10 +178,12 @@ def _sides(values: np.ndarray, s: np.ndarray, way: np.ndarray) -> tuple[float, f
     """Return the one value that a comparison has below, and that above; None if it has several."""
     # as they are where its way is above 0
     below, above = np.unique(values[s < 0.0]), np.unique(values[s > 0.0])
-    if not below.size == above.size == 1 or not (np.all(way > 0.0) or np.all(way < 0.0)):
+    if not below.size == above.size == 1:
         return None
     sides = float(below[0]), float(above[0])
-    return sides if way.min() > 0.0 else sides[::-1]
+    if sides[0] == sides[1] or np.all(way > 0.0):
+        return sides
+    return sides[::-1] if np.all(way < 0.0) else None
 
 
 @dataclass(frozen=True, kw_only=True)

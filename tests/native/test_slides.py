@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import nlctl
 
-methods = pytest.mark.parametrize("method", [None, "tsit5", "rodas5p"])
+methods = pytest.mark.parametrize("method", [None, "tsit5", "rodas5p", "taylor"])
 
 
 def plain(update, states, output=None, inputs=0, **more):
@@ -407,6 +407,20 @@ def test_a_product_compares_otherwise_behind_a_zero_of_its_other_factor():
     run = nlctl.input_output_response(plain(update, 3), [0, 1, 3], 0, [0.4, -0.5, 0.0])
     assert run.states[0] == pytest.approx([0.4, 0.0, 0.0], abs=1e-8)
     assert run.states[2] == pytest.approx([0.0, 0.2, 0.4 + 1.5 * 2.6], abs=1e-7)  # y = 1 at 3/2 s
+
+
+def test_what_shares_a_factor_and_does_not_change_stays_as_it_is():
+    """x' = 1/5 - sign(x / (z + 2)) rests at 0; y' = y / (z + 2) up to -1 moves meanwhile."""
+
+    def update(t, x, u, params):
+        return [0.2 - np.sign(x[0] / (x[2] + 2)), np.clip(x[1] / (x[2] + 2), -1, 1), 0.0]
+
+    meets = 2 * np.log(2)  # y = -exp(t / 2) = -2
+    times = np.array([0.0, 0.5, 1.0, meets, 3.0])
+    run = nlctl.input_output_response(plain(update, 3), times, 0, [0.4, -1.0, 0.0])
+    assert run.states[0] == pytest.approx([0.4, 0, 0, 0, 0], abs=1e-8)
+    expected = np.where(times < meets, -np.exp(times / 2), -2 - (times - meets))
+    assert run.states[1] == pytest.approx(expected, abs=1e-7)
 
 
 def test_an_inverse_slides():
