@@ -29,7 +29,7 @@ from .diagram.schedule import stand_in
 from .equations.blocks import Equations
 from .equations.relays import slide_places
 from .equations.slides import changing_at, declared_functions, of_both_sides, others_of
-from .happened import word_of, row_labels
+from .happened import row_labels, word_of
 from .integrate.state import Status
 from .results import Trajectory
 

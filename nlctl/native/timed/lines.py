@@ -33,7 +33,8 @@ class Lines:
     def at(self, starts: np.ndarray) -> Lines:
         """Return the same with pieces that begin at `starts`, its own among them."""
         k = np.searchsorted(self.starts, starts, side="right") - 1
-        values = self.values[k] + self.slopes[k] * (starts - self.starts[k])
+        with np.errstate(all="ignore"):  # a piece that nothing chooses may be a division by 0
+            values = self.values[k] + self.slopes[k] * (starts - self.starts[k])
         return Lines(starts=starts, values=values, slopes=self.slopes[k], end=self.end)
 
     def divided(self, at: np.ndarray) -> Lines:

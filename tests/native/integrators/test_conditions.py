@@ -5,6 +5,7 @@ import itertools
 import control as ct
 import numpy as np
 import pytest
+from scipy import signal
 
 import nlctl
 from nlctl.native.driver import Course, begin, finish, go_on, prepared
@@ -77,6 +78,11 @@ def fast_gaussian(t, x, u, p):
     return [np.exp(-(((t - 50.0) / 0.1) ** 2))]
 
 
+def teeth(t, x, u, p):
+    # its falling piece is a division by 0, which nothing chooses
+    return [40.0 * max(signal.sawtooth(2 * np.pi * t / 10.0) - 0.98, 0.0)]
+
+
 def sawtooth(t, x, u, p):
     return [1.0 + 0.5 * ((2.0 * x[0] + 0.3) % 1.0)]
 
@@ -134,6 +140,7 @@ CASES = {  # equations, initial state, last time, the first state there
     "circle": (circle, [0.0, 0.0, 1.0], 20.0, 4 * 10 * 4 * np.arcsin(0.005)),
     "slits": (slits, [0.0, 0.0, 1.0], 20.0, slits_end()),
     "stairs": (stairs, [0.0], 3.5, stairs_end(3.5)),
+    "teeth": (teeth, [0.0], 18.0, 40 * 0.02 * 0.1 / 2),
     "sawtooth": (sawtooth, [0.0], 3.5, sawtooth_end(3.5)),
     "rounded": (rounded, [2.2], 2.0, -0.5 - 2.0 * (2.0 - 0.7 / 3 - 0.5 - 1.0)),
     "truncated": (truncated, [1.5], 2.0, -(2.0 - 1.5 / 2)),
