@@ -402,7 +402,7 @@ def equation_parts(compiled: Compiled, extended_program: Extended, p: np.ndarray
     return EquationParts(
         equations=computed, extended=extended_program, program=program,
         inputs=compiled.system.ninputs or 0,
-        switching=[rows[k] for k in range(program.switching)],
+        switching=[computed.conditions.levels.get(k, rows[k]) for k in range(program.switching)],
         guards=[rows[first + k] for k in range(len(program.guards))],
         committed=list(_single(graph, computed.results["m"]).values()),
         switched=frozenset(jump), owners=tuple(owners), ordered=tuple(ordered),

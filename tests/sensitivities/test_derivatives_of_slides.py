@@ -59,3 +59,26 @@ def test_two_masses_with_friction_have_the_slopes_of_differences():
             for k in (-1, 1)
         ]
         assert by.derivatives[:, j] == pytest.approx((ends[1] - ends[0]) / (2 * h), abs=2e-5)
+
+
+def test_levels_that_are_passed_and_one_along_which_it_slides():
+    """x' = a - y, z' = y with y = floor(2 x) / 2: it passes 1/2, and stays at 1 with y = a."""
+
+    def update(t, x, u, params):
+        y = np.floor(2 * x[0]) / 2
+        return [params["a"] - y, y]
+
+    a = 0.8
+    loop = ct.nlsys(update, None, states=2, inputs=0, outputs=2, name="loop", params={"a": a})
+    times = np.array([0.0, 0.5, 1.5, 2.0, 4.0])
+    by = nlctl.sensitivity_response(
+        loop, times, of=["y[0]", "y[1]"], with_respect_to=["a"], rtol=1e-9, atol=1e-11
+    )
+    first, second = 0.5 / a, 0.5 / a + 0.5 / (a - 0.5)
+    later = -0.5 / a**2, -0.5 / a**2 - 0.5 / (a - 0.5) ** 2  # their derivatives by a
+    between, slides = (times > first) & (times < second), times > second
+    x = np.where(between, times - first - (a - 0.5) * later[0], np.where(slides, 0.0, times))
+    z = np.where(between, -0.5 * later[0], 0.0)
+    z = np.where(slides, 0.5 * (later[1] - later[0]) + times - second - a * later[1], z)
+    assert by.derivatives[:, 0] == pytest.approx(np.array([x, z]), abs=1e-7)
+    assert by.statistics.slides == ("floor of block 'loop'",)

@@ -76,6 +76,8 @@ class Conditions:
     shown: int = 0  # conditions that move an output of the diagram alone: none of these is located
     # by what functions are measured that are flat but for a narrow range of their argument
     sharp: tuple[SharpArgument, ...] = ()
+    # of slides along integers, which conditions locate: at what their relays switch, by their rows
+    levels: Mapping[int, Expr] = field(default_factory=dict)
 
     @property
     def switches_of_time(self) -> bool:

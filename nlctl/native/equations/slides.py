@@ -308,13 +308,18 @@ def _with_relays(
     derived: Sequence[SlidingRate],
 ) -> tuple[_Results, Conditions]:  # fmt: skip
     """Return results with what relays declare and remember, and without what they stand for."""
-    declared, kept = dict[int, Tracer](), dict[int, Tracer]()
+    declared, kept, levels = dict[int, Tracer](), dict[int, Tracer](), dict[int, Expr]()
     counts = [count_switching_functions(node) for node in reader.blocks]
     memories = [len(memory(node)) for node in reader.blocks]
     for slide, rate in zip(slides, derived, strict=True):
         i, given = slide.place, [slide.function, rate.drift, rate.gain]
         events = reader.events(i, array_of(reader.graph, given))
-        declared[sum(counts[:i])] = _declared_by(slide, events[: counts[i]])
+        row, functions = sum(counts[:i]), events[: counts[i]]
+        declared[row] = functions
+        if slide.node.slide and slide.node.slide.integers:  # conditions say where one is met
+            first, *others = functions.cells.flat
+            declared[row] = array_of(reader.graph, [slide.if_it_slides(first), *others])
+            levels[row] = first
         kept[sum(memories[:i])] = events[counts[i] :]
     silent = {row for slide in slides if slide.node.slide for row in slide.node.slide.declared}
     begin, rows = sum(counts), results["g"]
@@ -328,7 +333,7 @@ def _with_relays(
         g.append((begin, array))
         begin += array.size
     results = results | {"g": g, "m": [(row, kept.get(row, array)) for row, array in results["m"]]}
-    return results, replace(conditions, located=tuple(located.values()))
+    return results, replace(conditions, located=tuple(located.values()), levels=levels)
 
 
 def _left(slides: Sequence[_Between], conditions: Conditions) -> dict[int, Located]:
@@ -341,14 +346,6 @@ def _left(slides: Sequence[_Between], conditions: Conditions) -> dict[int, Locat
             if stands and stands.integers:
                 left[place] = replace(one, function=slide.unless_it_slides(one.function))
     return dict(sorted(left.items()))
-
-
-def _declared_by(slide: _Between, events: Tracer) -> Tracer:
-    """Return what a relay declares: of integers their conditions say where one is met."""
-    if not (slide.node.slide and slide.node.slide.integers):
-        return events
-    first, *others = events.cells.flat
-    return array_of(slide.graph, [slide.if_it_slides(first), *others])
 
 
 def _silenced(graph: Graph, row: int, array: Tracer, silent: set[int]) -> Tracer:
