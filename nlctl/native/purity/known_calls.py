@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import dataclasses
 import enum
 import functools
@@ -27,6 +26,7 @@ from .handed_on import handed_on, result_of_reduce, rows_of_functions, views_of
 from .values import (
     FRESH,
     OUTSIDE,
+    PLAIN,
     SLICE,
     VECTOR,
     Bound,
@@ -49,6 +49,7 @@ from .values import (
     function_choice,
     handed_out_again,
     holder,
+    is_builtin,
     least_upper_bound,
     library,
     python_function,
@@ -83,7 +84,7 @@ def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     ):
         return FRESH
     owner = getattr(thing, "__self__", None)
-    if _is_builtin(thing):
+    if is_builtin(thing):
         return _builtin(walk, thing, given)
     if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
         bound = method(walk, captured(owner), thing.__name__, given)
@@ -351,11 +352,6 @@ def check_object(value: KnownValue, what: str) -> None:
         raise Impure(f"{what} an object of type {type(thing).__name__}", "use arrays")
 
 
-def _is_builtin(thing: object) -> bool:
-    name = getattr(thing, "__name__", "")
-    return getattr(builtins, name, None) is thing if isinstance(name, str) else False
-
-
 def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     name, places = thing.__name__, given.places
     operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
@@ -385,13 +381,15 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if name == "next":
         _written(places[0], "next()")
         return element(places[0])
-    if name in named.NUMBERS_AND_TEXTS:
+    if thing is object:
+        return KnownValue(True, True, True, known=Instance(object))
+    of_number = name != "hash" or isinstance(places[0].known, (Unknown, *PLAIN))
+    if name in named.NUMBERS_AND_TEXTS and of_number:
         walk.numba_differs += ["text"] if name in ("str", "repr", "format") else []
         return FRESH
     if name == "print":
         raise Message("calls print()", OUTPUT)
-    advice = OUTPUT if name in ("input", "open") else "do without it"
-    raise Impure(f"calls {name}()", advice)
+    raise Impure(f"calls {name}()", OUTPUT if name in ("input", "open") else "do without it")
 
 
 _OPERATORS = {"len": "__len__", "abs": "__abs__"}

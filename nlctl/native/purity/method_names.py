@@ -46,9 +46,9 @@ OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows
              "asof")  # fmt: skip
 # of builtins that return numbers and texts
 NUMBERS_AND_TEXTS = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float",
-                     "format", "hasattr", "int", "isinstance", "issubclass", "len", "ord",
-                     "pow", "range", "repr", "round", "slice", "str", "sum", "bytes", "object",
-                     "bin", "hex"}  # fmt: skip
+                     "format", "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord",
+                     "pow", "range", "repr", "round", "slice", "str", "sum", "bytes", "bin",
+                     "hex"}  # fmt: skip
 # functions that draw random numbers inside, change settings for everybody, read or write files
 DRAWING = ("differential_evolution", "basinhopping", "dual_annealing", "eigs", "eigsh", "svds",
            "lobpcg", "kmeans", "kmeans2", "estimate_rank", "interp_decomp")  # fmt: skip

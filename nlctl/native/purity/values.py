@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -320,6 +321,12 @@ def handed_out_again(value: KnownValue) -> KnownValue:
     """Return what is known of a result that a cache hands out again: it outlives the call."""
     known = value.known if isinstance(value.known, (*PLAIN, Pure, FunctionType)) else UNKNOWN_VALUE
     return replace(value, own=False, inside=False, known=known)
+
+
+def is_builtin(thing: object) -> bool:
+    """Whether a function is one of Python's own."""
+    name = getattr(thing, "__name__", "")
+    return getattr(builtins, name, None) is thing if isinstance(name, str) else False
 
 
 def library(thing: object) -> str | None:
