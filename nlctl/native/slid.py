@@ -180,10 +180,10 @@ def _sides(values: np.ndarray, s: np.ndarray, way: np.ndarray) -> tuple[float, f
     below, above = np.unique(values[s < 0.0]), np.unique(values[s > 0.0])
     if not below.size == above.size == 1:
         return None
-    sides = float(below[0]), float(above[0])
-    if sides[0] == sides[1] or np.all(way > 0.0):
-        return sides
-    return sides[::-1] if np.all(way < 0.0) else None
+    low, high = float(below[0]), float(above[0])
+    if low == high or np.all(way > 0.0):
+        return low, high
+    return (high, low) if np.all(way < 0.0) else None
 
 
 @dataclass(frozen=True, kw_only=True)
