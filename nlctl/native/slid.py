@@ -9,7 +9,7 @@ until it chatters no longer, or at something else.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,13 @@ from .diagram.program import count_switching_functions, memory
 from .diagram.schedule import stand_in
 from .equations.blocks import Equations
 from .equations.relays import slide_places
-from .equations.slides import changing_at, declared_functions, of_both_sides, others_of
+from .equations.slides import (
+    changing_at,
+    declared_functions,
+    of_both_sides,
+    on_sides,
+    others_of,
+)
 from .happened import row_labels, word_of
 from .integrate.state import Status
 from .results import Trajectory
@@ -58,7 +64,10 @@ def slides_at(
     if jump.goes_on or jump.is_rough:
         return []
     read = compiled.equations_with(p)
-    around = _Around(compiled=compiled, read=read, arrays=_points(compiled, p, jump, scale))
+    around = _Around(
+        compiled=compiled, read=read, arrays=_points(compiled, p, jump, scale),
+        far=_far_points(compiled, p, jump),
+    )  # fmt: skip
     try:
         return around.slides()
     except Untraceable:  # there is what is called unchanged
@@ -78,6 +87,16 @@ def _points(
     return {"t": np.array([[jump.time]]), "x": x, "u": jump.inputs[:, None], "p": p[:, None]}
 
 
+def _far_points(compiled: Compiled, p: np.ndarray, jump: Jump) -> dict[str, np.ndarray]:
+    """Return times, states, inputs and parameters, of about the size of those of a jump."""
+    rng = np.random.default_rng(2)
+    x, u, t = (np.atleast_1d(v)[:, None] for v in (jump.after, jump.inputs, jump.time))
+    x, u, t = (v + rng.normal(size=(len(v), _AROUND)) * (1.0 + np.abs(v)) for v in (x, u, t))
+    still = [*compiled.program.memory, *compiled.program.sampled]
+    x[still] = jump.after[still, None]
+    return {"t": t, "x": x, "u": u, "p": p[:, None]}
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Around:
     """The equations at points around a jump."""
@@ -85,14 +104,17 @@ class _Around:
     compiled: Compiled
     read: Equations
     arrays: dict[str, np.ndarray]
+    far: dict[str, np.ndarray]  # at which what holds on a side has to hold as well
 
     @property
     def graph(self) -> Graph:
         return self.read.graph
 
-    def values(self, exprs: Sequence[Expr]) -> np.ndarray:
+    def values(
+        self, exprs: Sequence[Expr], arrays: dict[str, np.ndarray] | None = None
+    ) -> np.ndarray:
         """Return values of expressions at all points, those of vectors one below the other."""
-        values = evaluate_expressions(exprs, self.arrays)
+        values = evaluate_expressions(exprs, arrays or self.arrays)
         shapes = ((e.size or 1, _AROUND) for e in exprs)
         return np.concatenate([np.zeros((0, _AROUND)), *map(np.broadcast_to, values, shapes)])
 
@@ -134,7 +156,8 @@ class _Around:
         if len(steps) != 1:  # different ones, or steps and what compares
             return None
         (step,) = steps
-        (s,) = self.values([step or functions[0]])
+        function = step or functions[0]
+        (s,) = self.values([function])
         others = [others_of(self.graph, node, functions) for node in changing]
         ways = [np.ones(1) if e is None else self.values([e])[0] for e in others]
         sides = tuple(side for v, w in zip(values, ways, strict=True) if (side := _sides(v, s, w)))
@@ -144,6 +167,8 @@ class _Around:
         both = of_both_sides(self.graph, rates, changing, sides, functions)
         now, below, above = map(self.values, (rates, *both))
         if np.array_equal(below, above) or not np.array_equal(now, np.where(s < 0.0, below, above)):
+            return None
+        if not self._holds(function, functions, dict(zip(changing, sides, strict=True))):
             return None
         first = self.compiled.program.switching
         block, _ = row_labels(self.compiled, self.read.conditions)[rows[0]]
@@ -155,6 +180,19 @@ class _Around:
             sides=sides, integers=step is not None,
         )  # fmt: skip
         return slide, float(np.abs(s).max())
+
+    def _holds(
+        self, function: Expr, functions: Sequence[Expr], sides: Mapping[Expr, tuple[float, float]]
+    ) -> bool:
+        """Whether comparisons are on each side of a function what they are said to be, far away."""
+        both = [on_sides(self.graph, node, pair, functions) for node, pair in sides.items()]
+        nodes = [function, *sides, *(e for pair in both for e in pair)]
+        s, *values = self.values([self.graph.number(node) for node in nodes], self.far)
+        now, low, high = values[: len(sides)], values[len(sides) :: 2], values[len(sides) + 1 :: 2]
+        return all(
+            np.array_equal(a[s < 0.0], b[s < 0.0]) and np.array_equal(a[s > 0.0], c[s > 0.0])
+            for a, b, c in zip(now, low, high, strict=True)
+        )
 
     def _places(self, rows: Sequence[int]) -> tuple[int, ...]:
         """Return the places of located conditions, of integers those of even and of odd ones."""
@@ -181,7 +219,7 @@ def _sides(values: np.ndarray, s: np.ndarray, way: np.ndarray) -> tuple[float, f
     if not below.size == above.size == 1:
         return None
     low, high = float(below[0]), float(above[0])
-    if low == high or np.all(way > 0.0):
+    if low == high or np.all(way >= 0.0):
         return low, high
     return (high, low) if np.all(way < 0.0) else None
 

@@ -65,7 +65,7 @@ def of_both_sides(
 ) -> tuple[list[Expr], list[Expr]]:
     """Return expressions as they are where the first switching function is below 0, and above."""
     both = [
-        _on_sides(graph, node, values, functions)
+        on_sides(graph, node, values, functions)
         for node, values in zip(changing, sides, strict=True)
     ]
     below, above = (
@@ -75,10 +75,10 @@ def of_both_sides(
     return below, above
 
 
-def _on_sides(
+def on_sides(
     graph: Graph, node: Expr, values: Sequence[float], functions: Sequence[Expr]
 ) -> tuple[Expr, Expr]:
-    """Return what a comparison is below and above; `values` are those where `others_of` is > 0."""
+    """Return what a comparison is below and above; `values` where `others_of` is not < 0."""
     low, high = (graph.const(bool(v) if node.kind == "b" else float(v)) for v in values)
     if node.op in _EQUAL:
         return low, high
@@ -89,7 +89,7 @@ def _on_sides(
     others = others_of(graph, node, functions)
     if others is None:
         return low, high
-    way = graph.op("gt", others, graph.const(0.0))
+    way = graph.op("ge", others, graph.const(0.0))  # edges of a domain are 0 at least
     if node.kind == "b":
         return graph.op("xor", way, high), graph.op("xor", way, low)
     return graph.op("select", way, low, high), graph.op("select", way, high, low)
