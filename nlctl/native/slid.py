@@ -9,8 +9,9 @@ until it chatters no longer, or at something else.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from .diagram.schedule import stand_in
 from .equations.blocks import Equations
 from .equations.relays import slide_places
 from .equations.slides import (
+    Pairs,
     changing_at,
     declared_functions,
     of_both_sides,
@@ -148,9 +150,7 @@ class _Around:
 
     def _slide(self, rows: Sequence[int], functions: list[Expr]) -> tuple[Slide, float] | None:
         """Return a slide of conditions that change together, if rates jump there as it has them."""
-        every = [e for name in self.read.results for e, _ in self.read.pieces(name)]
-        every += [e for part in self.read.fixed_points.values() for e in part]
-        changing = changing_at(self.graph, every, functions)
+        changing = changing_at(self.graph, self._every, functions)
         values = self.values(changing)
         steps = {zigzag(self.graph, n) for n, v in zip(changing, values, strict=True) if np.ptp(v)}
         if len(steps) != 1:  # different ones, or steps and what compares
@@ -163,12 +163,15 @@ class _Around:
         sides = tuple(side for v, w in zip(values, ways, strict=True) if (side := _sides(v, s, w)))
         if len(sides) < len(values) or (step is not None and np.abs(s).max() > _NEAR):
             return None
-        rates = [e for name in ("dx", "y") for e, _ in self.read.pieces(name)]
-        both = of_both_sides(self.graph, rates, changing, sides, functions)
-        now, below, above = map(self.values, (rates, *both))
+        pairs = {
+            node: on_sides(self.graph, node, side, functions)
+            for node, side in zip(changing, sides, strict=True)
+        }
+        both = of_both_sides(self.graph, self._rates, pairs)
+        now, below, above = map(self.values, (self._rates, *both))
         if np.array_equal(below, above) or not np.array_equal(now, np.where(s < 0.0, below, above)):
             return None
-        if not self._holds(function, functions, dict(zip(changing, sides, strict=True))):
+        if not self._holds(function, pairs):
             return None
         first = self.compiled.program.switching
         block, _ = row_labels(self.compiled, self.read.conditions)[rows[0]]
@@ -181,14 +184,22 @@ class _Around:
         )  # fmt: skip
         return slide, float(np.abs(s).max())
 
-    def _holds(
-        self, function: Expr, functions: Sequence[Expr], sides: Mapping[Expr, tuple[float, float]]
-    ) -> bool:
+    @cached_property
+    def _every(self) -> list[Expr]:
+        """All that the equations compute."""
+        every = [e for name in self.read.results for e, _ in self.read.pieces(name)]
+        return every + [e for part in self.read.fixed_points.values() for e in part]
+
+    @cached_property
+    def _rates(self) -> list[Expr]:
+        """Rates, and outputs."""
+        return [e for name in ("dx", "y") for e, _ in self.read.pieces(name)]
+
+    def _holds(self, function: Expr, pairs: Pairs) -> bool:
         """Whether comparisons are on each side of a function what they are said to be, far away."""
-        both = [on_sides(self.graph, node, pair, functions) for node, pair in sides.items()]
-        nodes = [function, *sides, *(e for pair in both for e in pair)]
+        nodes = [function, *pairs, *(e for pair in pairs.values() for e in pair)]
         s, *values = self.values([self.graph.number(node) for node in nodes], self.far)
-        now, low, high = values[: len(sides)], values[len(sides) :: 2], values[len(sides) + 1 :: 2]
+        now, low, high = values[: len(pairs)], values[len(pairs) :: 2], values[len(pairs) + 1 :: 2]
         return all(
             np.array_equal(a[s < 0.0], b[s < 0.0]) and np.array_equal(a[s > 0.0], c[s > 0.0])
             for a, b, c in zip(now, low, high, strict=True)

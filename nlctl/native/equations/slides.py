@@ -22,7 +22,7 @@ from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array
 from ...expressions.conditions import of_zigzag, switching_functions, zigzag
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
-from ..diagram.nodes import Node
+from ..diagram.nodes import Slide
 from ..diagram.program import count_switching_functions, memory
 from ..diagram.schedule import Schedule
 from ..sliding.rates import OUTPUTS, Motion, SlidingInput, SlidingRate, sliding_rates
@@ -31,6 +31,7 @@ from .reader import Reader
 from .relays import array_of, kept_of, limits_of, relay_places
 
 _Results = dict[str, list[tuple[int, Tracer]]]
+Pairs = Mapping[Expr, tuple[Expr, Expr]]  # of comparisons what they are below, and above
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
 _JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", "floor", "ceil", "trunc", "rint")
 _BLENDED = ("dx", "g", "y")
@@ -56,23 +57,10 @@ def _functions(graph: Graph, node: Expr) -> tuple[Expr, ...]:
     return switching_functions(graph, node) if node.varies else ()
 
 
-def of_both_sides(
-    graph: Graph,
-    exprs: Sequence[Expr],
-    changing: Sequence[Expr],
-    sides: Sequence[Sequence[float]],
-    functions: Sequence[Expr],
-) -> tuple[list[Expr], list[Expr]]:
-    """Return expressions as they are where the first switching function is below 0, and above."""
-    both = [
-        on_sides(graph, node, values, functions)
-        for node, values in zip(changing, sides, strict=True)
-    ]
-    below, above = (
-        _folded(graph, exprs, {node: one[k] for node, one in zip(changing, both, strict=True)})
-        for k in range(2)
-    )
-    return below, above
+def of_both_sides(graph: Graph, exprs: Sequence[Expr], pairs: Pairs) -> list[list[Expr]]:
+    """Return expressions as they are below and above, where comparisons are what is said."""
+    ways = ({node: pair[k] for node, pair in pairs.items()} for k in range(2))
+    return [_folded(graph, exprs, way) for way in ways]
 
 
 def on_sides(
@@ -131,46 +119,37 @@ class _Between:
     """A slide among equations: what it changes there, and the relay's output that blends them."""
 
     graph: Graph
-    node: Node
-    place: int  # of the node among the blocks
+    slide: Slide
+    place: int  # of its node among the blocks
     leaf: Expr  # what stands for the relay's output, from -1 to 1
     kept: Expr  # its mode: 1 or -1 on a side, 0 where it slides
     function: Expr  # the switching function, the relay's input
-    functions: tuple[Expr, ...]  # all that change their signs with it, as they are in equations
-    changing: tuple[Expr, ...]
+    pairs: Pairs  # what changes there
 
     def blended(self, exprs: Sequence[Expr], v: Expr) -> list[Expr]:
         """Return expressions as they are at a `v` between both sides, next to these."""
+        sides = of_both_sides(self.graph, exprs, self.pairs)
+        return [self._between(a, b, v) for a, b in zip(*sides, strict=True)]
+
+    def _between(self, a: Expr, b: Expr, v: Expr) -> Expr:
         op, half = self.graph.op, self.graph.const(0.5)
-        blended = []
-        for a, b in zip(*self._sides(exprs), strict=True):
-            mean, apart = op("mul", half, op("add", a, b)), op("mul", half, op("sub", b, a))
-            blended.append(a if a is b else op("add", mean, op("mul", v, apart)))
-        return blended
+        mean, apart = op("mul", half, op("add", a, b)), op("mul", half, op("sub", b, a))
+        return a if a is b else op("add", mean, op("mul", v, apart))
 
     def by_mode(self, exprs: Sequence[Expr], v: Expr) -> list[Expr]:
         """Return expressions as they are on the side that the relay's memory says, or between."""
         op, const = self.graph.op, self.graph.const
         below, above = op("lt", self.kept, const(0.0)), op("gt", self.kept, const(0.0))
-        sides, chosen = self._sides(exprs), []
-        for a, b, between in zip(*sides, self.blended(exprs, v), strict=True):
-            inner = op("select", above, b, between)
-            chosen.append(a if a is b is between else op("select", below, a, inner))
+        chosen = []
+        for a, b in zip(*of_both_sides(self.graph, exprs, self.pairs), strict=True):
+            inner = op("select", above, b, self._between(a, b, v))
+            chosen.append(a if a is b else op("select", below, a, inner))
         return chosen
 
-    def if_it_slides(self, function: Expr, otherwise: Expr | None = None) -> Expr:
-        """Return a switching function while it slides, and else one that never switches."""
-        const, op = self.graph.const, self.graph.op
-        slides = op("eq", self.kept, const(0.0))
-        return op("select", slides, function, otherwise or const(1.0))
-
-    def unless_it_slides(self, function: Expr) -> Expr:
-        """Return a switching function, and one that never switches while it slides."""
-        return self.if_it_slides(self.graph.const(1.0), function)
-
-    def _sides(self, exprs: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
-        sides = self.node.slide.sides if self.node.slide else ()
-        return of_both_sides(self.graph, exprs, self.changing, sides, self.functions)
+    def if_it_slides(self, one: Expr, other: Expr) -> Expr:
+        """Return an expression while it slides, and else another."""
+        slides = self.graph.op("eq", self.kept, self.graph.const(0.0))
+        return self.graph.op("select", slides, one, other)
 
 
 def _by_terms(
@@ -185,7 +164,7 @@ def _by_terms(
         return change(0, exprs)
     depends: dict[Expr, frozenset[int]] = {}
     for node in needed(exprs):
-        here = {k for k, slide in enumerate(slides) if node in slide.changing}
+        here = {k for k, slide in enumerate(slides) if node in slide.pairs}
         depends[node] = frozenset(here).union(*(depends[arg] for arg in node.args))
 
     def terms(node: Expr) -> tuple[Expr, ...]:
@@ -234,21 +213,23 @@ def _slides(reader: Reader, results: _Results, conditions: Conditions) -> list[_
     declared = declared_functions(results, sum(map(count_switching_functions, reader.blocks)))
     slides: list[_Between] = []
     for i, node in enumerate(reader.blocks):
-        if node.slide is None:
+        if (slide := node.slide) is None:
             continue
-        functions = [declared[row] for row in node.slide.declared]
-        functions += [conditions.located[place].function for place in node.slide.places]
+        functions = [declared[row] for row in slide.declared]
+        functions += [conditions.located[place].function for place in slide.places]
         changing = changing_at(graph, every, functions)
-        if len(changing) != len(node.slide.sides):
-            raise CompileError(f"{_who(node)} compares otherwise than where it was seen to jump")
+        if len(changing) != len(slide.sides):
+            raise CompileError(f"{_who(slide)} compares otherwise than where it was seen to jump")
+        sides = zip(changing, slide.sides, strict=True)
         function = functions[0]
-        if node.slide.integers:
+        if slide.integers:
             function = next(filter(None, (zigzag(graph, one) for one in changing)), function)
         leaf = graph.leaf(OUTPUTS, first + len(slides), None)
         slides.append(
             _Between(
-                graph=graph, node=node, place=i, leaf=leaf, kept=kept_of(reader, i),
-                function=function, functions=tuple(functions), changing=changing,
+                graph=graph, slide=slide, place=i, leaf=leaf, kept=kept_of(reader, i),
+                function=function,
+                pairs={one: on_sides(graph, one, pair, functions) for one, pair in sides},
             )
         )  # fmt: skip
     return slides
@@ -274,11 +255,11 @@ def _derived(
     rates |= {m: graph.const(0.0) for node in reader.blocks for m in memory(node)}
     inputs = [
         SlidingInput(
-            name=_who(slide.node), leaf=slide.leaf, kept=slide.kept,
-            limits=limits_of(reader, slide.place),
-            given=blended([slide.function], [other for other in slides if other is not slide])[0],
+            name=_who(between.slide), leaf=between.leaf, kept=between.kept,
+            limits=limits_of(reader, between.place),
+            given=blended([between.function], [o for o in slides if o is not between])[0],
         )
-        for slide in slides
+        for between in slides
     ]  # fmt: skip
 
     def output(k: int, known: Sequence[Expr]) -> Expr:
@@ -311,17 +292,18 @@ def _with_relays(
     declared, kept, levels = dict[int, Tracer](), dict[int, Tracer](), dict[int, Expr]()
     counts = [count_switching_functions(node) for node in reader.blocks]
     memories = [len(memory(node)) for node in reader.blocks]
-    for slide, rate in zip(slides, derived, strict=True):
-        i, given = slide.place, [slide.function, rate.drift, rate.gain]
+    for between, rate in zip(slides, derived, strict=True):
+        i, given = between.place, [between.function, rate.drift, rate.gain]
         events = reader.events(i, array_of(reader.graph, given))
         row, functions = sum(counts[:i]), events[: counts[i]]
         declared[row] = functions
-        if slide.node.slide and slide.node.slide.integers:  # conditions say where one is met
+        if between.slide.integers:  # conditions say where one is met
             first, *others = functions.cells.flat
-            declared[row] = array_of(reader.graph, [slide.if_it_slides(first), *others])
+            silent_first = between.if_it_slides(first, reader.graph.const(1.0))
+            declared[row] = array_of(reader.graph, [silent_first, *others])
             levels[row] = first
         kept[sum(memories[:i])] = events[counts[i] :]
-    silent = {row for slide in slides if slide.node.slide for row in slide.node.slide.declared}
+    silent = {row for between in slides for row in between.slide.declared}
     begin, rows = sum(counts), results["g"]
     behind = [array for row, array in rows if row >= begin]
     located = _left(slides, conditions)
@@ -339,12 +321,12 @@ def _with_relays(
 def _left(slides: Sequence[_Between], conditions: Conditions) -> dict[int, Located]:
     """Return the conditions that are left: those of integers, where nothing slides along them."""
     left = dict(enumerate(conditions.located))
-    for slide in slides:
-        stands = slide.node.slide
-        for place in stands.places if stands else ():
+    for between in slides:
+        for place in between.slide.places:
             one = left.pop(place)
-            if stands and stands.integers:
-                left[place] = replace(one, function=slide.unless_it_slides(one.function))
+            if between.slide.integers:
+                function = between.if_it_slides(between.graph.const(1.0), one.function)
+                left[place] = replace(one, function=function)
     return dict(sorted(left.items()))
 
 
@@ -385,5 +367,6 @@ def _pieces(results: _Results) -> list[Expr]:
     return [e for rows in results.values() for _, array in rows for e, _ in array.pieces()]
 
 
-def _who(node: Node) -> str:
-    return f"{node.slide.what[1]} of block '{node.slide.what[0]}'" if node.slide else node.path
+def _who(slide: Slide) -> str:
+    block, what = slide.what
+    return f"{what} of block '{block}'"
