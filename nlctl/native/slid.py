@@ -41,8 +41,10 @@ from .happened import row_labels, word_of
 from .integrate.state import Status
 from .results import Trajectory
 
-_MOST = 24  # conditions of one run that slide
-_NUMBERS = 64  # elements of an array that slide one by one
+Slides = list[tuple["Slide", float]]  # each with how far its function is from 0 at rest
+
+_MOST = 24  # runs again
+_NUMBERS = 256  # elements of an array that slide one by one
 _AROUND = 64  # points
 _NEAR = 0.25  # of a step: how far from its jump it is looked at
 _AHEAD = 1e-9  # times the run's length: what comes no further has not slid
@@ -58,22 +60,29 @@ class Slid:
     compiled: Compiled
 
 
-def slides_at(
-    compiled: Compiled, p: np.ndarray, jump: Jump, scale: np.ndarray
-) -> list[tuple[Slide, float]]:
-    """Return conditions that explain a jump, each with how far its function is from 0 around it."""
+def slides_at(compiled: Compiled, p: np.ndarray, jump: Jump, scale: np.ndarray) -> list[Slides]:
+    """Return conditions that explain a jump, first with others of their kind, none if none do."""
     # `scale` (nstates,): by how much each state may be off.
     if jump.goes_on or jump.is_rough:
         return []
-    read = compiled.equations_with(p)
+    near, far = _points(compiled, p, jump, scale), _far_points(compiled, p, jump, 2)
     around = _Around(
-        compiled=compiled, read=read, arrays=_points(compiled, p, jump, scale),
-        far=_far_points(compiled, p, jump),
-    )  # fmt: skip
+        compiled=compiled, read=compiled.equations_with(p), arrays=near, near=near, far=far
+    )
     try:
-        return around.slides()
+        slides = around.slides()
+        others = _siblings(around, slides, _far_points(compiled, p, jump, 3))
     except Untraceable:  # there is what is called unchanged
         return []
+    return [slides + others, slides] if others else [slides] if slides else []
+
+
+def _siblings(around: _Around, slides: Slides, apart: dict[str, np.ndarray]) -> Slides:
+    """Return slides of the same kind in the same block as others: elements of an array."""
+    whats = {one.what for one, _ in slides}
+    every = replace(around, arrays=apart).slides() if slides else []
+    alike = [(one, rest) for one, rest in every if one.what in whats and rest > 0.0]
+    return [one for one in alike if not any(one[0].shares(other) for other, _ in slides)]
 
 
 def _points(
@@ -89,9 +98,9 @@ def _points(
     return {"t": np.array([[jump.time]]), "x": x, "u": jump.inputs[:, None], "p": p[:, None]}
 
 
-def _far_points(compiled: Compiled, p: np.ndarray, jump: Jump) -> dict[str, np.ndarray]:
+def _far_points(compiled: Compiled, p: np.ndarray, jump: Jump, seed: int) -> dict[str, np.ndarray]:
     """Return times, states, inputs and parameters, of about the size of those of a jump."""
-    rng = np.random.default_rng(2)
+    rng = np.random.default_rng(seed)
     x, u, t = (np.atleast_1d(v)[:, None] for v in (jump.after, jump.inputs, jump.time))
     x, u, t = (v + rng.normal(size=(len(v), _AROUND)) * (1.0 + np.abs(v)) for v in (x, u, t))
     still = [*compiled.program.memory, *compiled.program.sampled]
@@ -105,7 +114,8 @@ class _Around:
 
     compiled: Compiled
     read: Equations
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, np.ndarray]  # at which it is seen what changes with what
+    near: dict[str, np.ndarray]  # which the run might as well have reached
     far: dict[str, np.ndarray]  # at which what holds on a side has to hold as well
 
     @property
@@ -133,7 +143,7 @@ class _Around:
             first += one.rows
         return rows
 
-    def slides(self) -> list[tuple[Slide, float]]:
+    def slides(self) -> Slides:
         """Return the conditions at which the rates jump, and nothing else does around it."""
         rows = self._rows
         functions = self.values([*rows.values()])
@@ -182,7 +192,8 @@ class _Around:
             declared=tuple(row for row in rows if row < first),
             sides=sides, integers=step is not None,
         )  # fmt: skip
-        return slide, float(np.abs(s).max())
+        (z,) = self.values([function], self.near)
+        return slide, float(np.abs(z).max() if z.min() < 0.0 < z.max() else 0.5 * np.ptp(z))
 
     @cached_property
     def _every(self) -> list[Expr]:
@@ -262,9 +273,22 @@ class SlidRun:
             )
         )  # fmt: skip
 
+    @property
+    def _has_slid(self) -> list[bool]:
+        """Whether each relay has slid: at a time of the run, or until an end that is noted."""
+        nodes, rows = self.compiled.schedule.nodes, self.reached.happened.label // 2
+        begins = np.cumsum([0, *map(count_switching_functions, nodes)])
+        return [
+            bool((np.abs(self.reached.states[nodes[i].state_offset, 1:]) < 0.5).any())
+            or bool(np.isin(rows, range(begins[i] + 1, begins[i + 1])).any())
+            for i in slide_places(nodes)
+        ]
+
     def named(self, reached: Trajectory) -> Trajectory:
-        """Return a run that says along what it slides."""
-        whats = (slide.what for slide, _ in self.slides)
+        """Return a run that says along what it has slid."""
+        whats = (
+            slide.what for (slide, _), slid in zip(self.slides, self._has_slid, strict=True) if slid
+        )
         names = tuple(f"{what} of block '{block}'" for block, what in whats)
         return replace(reached, statistics=replace(reached.statistics, slides=names))
 
@@ -278,29 +302,45 @@ def sliding(
 ) -> SlidRun:
     """Return a run that chatters no longer, if relays can stand for the conditions of that."""
     # `run` has a diagram, an initial state and a parameter vector.
-    x0, p = start
+    _, p = start
     last = best = SlidRun(compiled=compiled, p=p, reached=reached)
-    while (jump := last.reached.statistics.jump) is not None and len(last.slides) < _MOST:
-        done = last.reached.statistics
+    for _ in range(_MOST):
+        done, jump = last.reached.statistics, last.reached.statistics.jump
+        if jump is None:
+            break
         scale = done.atol + done.rtol * np.maximum(np.abs(jump.before), np.abs(jump.after))
         more = slides_at(last.compiled, last.p, jump, scale)
         if not more and _has_loops(compiled):
             return sliding(run, _in_numbers(compiled), reached, start, span)
-        if not more:
+        tried = (_further(run, compiled, last, each, start, span) for each in more)
+        if (further := next(filter(None, tried), None)) is None:
             break
-        slides = (*last.slides, *((_counted(slide, last.slides), far) for slide, far in more))
-        try:
-            diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
-            whole = _parameters(diagram, p, [far for _, far in slides], span)
-            further = run(diagram, np.append(x0, np.zeros(len(slides))), whole)
-        except (CompileError, ParameterError):
-            break
-        last = SlidRun(compiled=diagram, p=whole, reached=further, slides=slides)
+        last = further
         # of relays whose inputs depend on each other no output is known: it ends where that is so
-        ahead = further.statistics.time - best.reached.statistics.time
-        if further.statistics.status is Status.OK or ahead > _AHEAD * span:
+        ahead = last.reached.statistics.time - best.reached.statistics.time
+        if last.reached.statistics.status is Status.OK or ahead > _AHEAD * span:
             best = last
     return best
+
+
+def _further(
+    run: Callable[[Compiled, np.ndarray, np.ndarray], Trajectory],
+    compiled: Compiled,
+    last: SlidRun,
+    more: Slides,
+    start: tuple[np.ndarray, np.ndarray],
+    span: float,
+) -> SlidRun | None:
+    """Return a run with relays for more conditions, None if they cannot be read."""
+    x0, p = start
+    slides = (*last.slides, *((_counted(slide, last.slides), far) for slide, far in more))
+    try:
+        diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
+        whole = _parameters(diagram, p, [far for _, far in slides], span)
+        reached = run(diagram, np.append(x0, np.zeros(len(slides))), whole)
+    except (CompileError, ParameterError):
+        return None
+    return SlidRun(compiled=diagram, p=whole, reached=reached, slides=slides)
 
 
 def _has_loops(compiled: Compiled) -> bool:

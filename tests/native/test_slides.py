@@ -330,31 +330,8 @@ def test_elements_of_an_array_slide_one_by_one():
     v = start[:, None] + (c - 1)[:, None] * times
     assert run.states == pytest.approx(np.where(c[:, None] < 1, np.maximum(v, 0), v), abs=1e-8)
     rests = (c < 1) & (start / (1 - c) < 6)
-    assert sum(name.startswith("sign") for name in run.statistics.slides) >= rests.sum()
+    assert len(run.statistics.slides) == rests.sum()  # others are not said to slide
     assert f"along {len(run.statistics.slides)} x sign of block 'plant'" in str(run)
-
-
-def chain(count, sign):
-    """Masses on springs with dry friction, of which the first one is shaken."""
-
-    def update(t, x, u, params):
-        q, v = x[:count], x[count:]
-        stretched = 3.0 * np.diff(q)
-        force = np.concatenate([[np.sin(t) * (2 + 0.5 * count)], np.zeros(count - 1)])
-        force = force + np.concatenate([stretched, [0.0]]) - np.concatenate([[0.0], stretched])
-        return np.concatenate([v, force - 0.4 * sign(v) - 0.05 * v])
-
-    return update
-
-
-def test_ten_masses_with_friction():
-    times = np.linspace(0, 12, 13)
-    run = nlctl.input_output_response(plain(chain(10, np.sign), 20), times, 0, 0)
-    smooth = chain(10, lambda v: np.clip(v / 1e-5, -1, 1))
-    expected = solve_ivp(lambda t, x: smooth(t, x, 0, 0), [0, 12], np.zeros(20), "Radau", times,
-                         rtol=1e-6, atol=1e-8, max_step=0.05)  # fmt: skip
-    assert run.states == pytest.approx(expected.y, abs=2e-4)
-    assert len(run.statistics.slides) == 10
 
 
 def friction(law, held):

@@ -24,6 +24,11 @@ class Slide:
     # whether that is at each integer of something: two conditions, of even ones and of odd ones
     integers: bool = False
 
+    def shares(self, other: Slide) -> bool:
+        """Whether it has a condition that another one has."""
+        apart = set(self.places).isdisjoint(other.places)
+        return not (apart and set(self.declared).isdisjoint(other.declared))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Node:

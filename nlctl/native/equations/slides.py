@@ -22,6 +22,7 @@ from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array
 from ...expressions.conditions import of_zigzag, switching_functions, zigzag
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
+from ...wording import counted
 from ..diagram.nodes import Slide
 from ..diagram.program import count_switching_functions, memory
 from ..diagram.schedule import Schedule
@@ -35,6 +36,8 @@ Pairs = Mapping[Expr, tuple[Expr, Expr]]  # of comparisons what they are below, 
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
 _JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", "floor", "ceil", "trunc", "rint")
 _BLENDED = ("dx", "g", "y")
+_SUMS = ("add", "sub", "neg", "sum", "concat", "item", "slice")  # linear in all that they are of
+_SEVERAL = 8  # conditions on which one number may depend otherwise: it has 2^8 sides
 
 
 def changing_at(graph: Graph, exprs: Iterable[Expr], functions: Iterable[Expr]) -> tuple[Expr, ...]:
@@ -168,14 +171,16 @@ def _by_terms(
         depends[node] = frozenset(here).union(*(depends[arg] for arg in node.args))
 
     def terms(node: Expr) -> tuple[Expr, ...]:
-        by = [bool(depends[arg]) for arg in node.args]
-        scaled = (node.op == "mul" and sum(by) == 1) or (node.op == "div" and not by[1])
-        several = len(depends[node]) > 1 and (node.op in ("add", "sub", "neg") or scaled)
-        return node.args if several else ()
+        by = [depends[arg] for arg in node.args]
+        apart = (node.op == "mul" and by[0].isdisjoint(by[1])) or (node.op == "div" and not by[1])
+        return node.args if len(depends[node]) > 1 and (node.op in _SUMS or apart) else ()
 
     def changed(node: Expr) -> Expr:
         if terms(node):
-            return graph.op(node.op, *(new[arg] for arg in node.args))
+            return graph.like(node, *(new[arg] for arg in node.args))
+        if len(depends[node]) > _SEVERAL:
+            conditions = counted(len(depends[node]), "condition")
+            raise CompileError(f"a number has too many sides: it depends on {conditions}")
         one = [node]
         for k in sorted(depends[node]):
             one = change(k, one)
