@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..wording import numbered
 from .compiled import Compiled
 from .diagram.program import count_guards, count_switching_functions
 from .equations.located import Conditions
+from .integrate.events.location import behind_event
 from .integrate.log import OF_TIME, log_room
 from .integrate.memory import grown, with_fields
 from .integrate.workspace import Task, Work
@@ -80,11 +82,41 @@ def happened(compiled: Compiled, run: Any, j: int = 0) -> EventLog:
     rows = row_labels(compiled, conditions)
     labels = [(*row, direction) for row in rows for direction in _DIRECTIONS]
     count = int(run.lanes["noted"][j])
-    time, coded = run.work.log.t[:count, j].copy(), run.work.log.row[:count, j]
+    time, coded = _resolved(compiled, run, run.work.log.t[:count, j], run.work.log.row[:count, j])
     label = np.where(coded // 2 == OF_TIME, len(labels), coded)
     if conditions.declared_of_time:
         time, label = _with_declared(conditions, run.task, j, time, label, len(labels))
     return EventLog(time=time, label=label, labels=(*labels, ("", "condition of t", "")))
+
+
+def _resolved(
+    compiled: Compiled, run: Any, time: np.ndarray, coded: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return events without those that come as soon behind another as location can tell."""
+    # A run meets what it stays at by a small way to and fro: where it begins to slide, or comes to
+    # rest at sign(0) = 0.  Twice might be a touch, where nothing says that it slides.
+    nodes, stays = compiled.schedule.nodes, np.ones(time.size, dtype=bool)
+    begins = np.cumsum([0, *map(count_switching_functions, nodes)])
+    slides = {int(begins[i]) for i, node in enumerate(nodes) if node.slide is not None}
+    late = getattr(behind_event, "py_func", behind_event)  # compiled for machine code alone
+    soon = 2.0 * late(run.task.rtol)  # there and back, of the time since the event before
+    for row in set((coded[coded >= 0] // 2).tolist()) & set(range(run.task.rows.watched)):
+        places = np.flatnonzero(coded // 2 == row)
+        gaps = np.diff(time[places], prepend=run.task.times[0])
+        for first, last in _crowds(gaps, soon):
+            if last - first > (1 if row in slides else 2):
+                stays[places[first + 1 : last]] = False
+    return time[stays], coded[stays]
+
+
+def _crowds(gaps: np.ndarray, soon: float) -> Iterator[tuple[int, int]]:
+    """Yield the first of events that come soon behind another, and the first behind these."""
+    last = 0
+    for first in np.flatnonzero(gaps[1:] <= soon * gaps[:-1]).tolist():
+        if first >= last:
+            further = np.flatnonzero(gaps[first + 1 :] > soon * gaps[first])
+            last = first + 1 + int(further[0]) if further.size else gaps.size
+            yield first, last
 
 
 def _with_declared(

@@ -57,6 +57,8 @@ def test_a_run_stays_where_both_sides_lead_back(update, method):
     # sign and heaviside have the mean where they are asked at 1/2 itself
     assert len(run.statistics.slides) == 1 or update in (by_sign, by_heaviside)
     assert ("slides   along" in str(run)) == bool(run.statistics.slides)
+    assert run.events["time"].to_numpy() == pytest.approx([0.5], abs=1e-6)  # once
+    assert run.events["direction"].item() in ("rising", "falling")
 
 
 def test_without_sliding_it_ends_with_the_reason():
