@@ -107,6 +107,8 @@ def simulate(
     show_metrics(times, signals)
     if response.statistics is not None and response.statistics.slides:
         notify(f"it slides along {response.statistics.along}")
+        if response.statistics.forks:
+            notify(response.statistics.ways)
     if small := response.small_outputs():
         notify(small)
     if csv is not None:

@@ -128,11 +128,19 @@ def run_once(
             run.lanes["status"] = Status.STOPPED
         u = run.work.u.copy()  # where it has ended
         outputs = finish(run)
-    reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
+    reached = with_events(compiled, run, made(run, outputs, 0))
     reached = at_its_end(run, reached, u)
     if run.spare is not None:
         give_back(compiled.cache, run.spare)
     return reached
+
+
+def with_events(compiled: Compiled, run: Any, reached: Trajectory, j: int = 0) -> Trajectory:
+    """Return what became of lane `j` of a run with what has happened in it."""
+    log = happened(compiled, run, j)
+    return replace(
+        reached, happened=log, statistics=replace(reached.statistics, events=log.time.size)
+    )
 
 
 def _sampled(course: Course, x0: np.ndarray, p: np.ndarray) -> Trajectory:

@@ -36,10 +36,18 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
-from .driver import Course, begin, finish, followed_up, prepared, trajectory, watched
+from .driver import (
+    Course,
+    begin,
+    finish,
+    followed_up,
+    prepared,
+    trajectory,
+    watched,
+    with_events,
+)
 from .ensemble_result import Ensemble, MetricLike, SignalsByName
 from .floats import as_given
-from .happened import happened
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
@@ -303,7 +311,7 @@ def _group(every: Members, numbers: range, course: Course, stop: Event) -> Itera
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
             yield trajectory(course, x0[:, j], p[:, j])
         else:
-            member = replace(made(run, outputs, j), happened=happened(compiled, run, j))
+            member = with_events(compiled, run, made(run, outputs, j), j)
             yield followed_up(course, member, x0[:, j], p[:, j])
 
 

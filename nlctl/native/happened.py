@@ -95,18 +95,26 @@ def _resolved(
     """Return events without those that come as soon behind another as location can tell."""
     # A run meets what it stays at by a small way to and fro: where it begins to slide, or comes to
     # rest at sign(0) = 0.  Twice might be a touch, where nothing says that it slides.
-    nodes, stays = compiled.schedule.nodes, np.ones(time.size, dtype=bool)
-    begins = np.cumsum([0, *map(count_switching_functions, nodes)])
-    slides = {int(begins[i]) for i, node in enumerate(nodes) if node.slide is not None}
     late = getattr(behind_event, "py_func", behind_event)  # compiled for machine code alone
     soon = 2.0 * late(run.task.rtol)  # there and back, of the time since the event before
-    for row in set((coded[coded >= 0] // 2).tolist()) & set(range(run.task.rows.watched)):
-        places = np.flatnonzero(coded // 2 == row)
+    row, stays, slides = coded // 2, np.ones(time.size, dtype=bool), slide_rows(compiled)
+    slid = [k for rows in slides for k in rows]
+    alone = set(row[coded >= 0].tolist()) & set(range(run.task.rows.watched)) - {*slid}
+    for rows in (*slides, *([k] for k in alone)):
+        places = np.flatnonzero(np.isin(row, rows))
         gaps = np.diff(time[places], prepend=run.task.times[0])
         for first, last in _crowds(gaps, soon):
-            if last - first > (1 if row in slides else 2):
-                stays[places[first + 1 : last]] = False
+            if last - first > (1 if len(rows) > 1 else 2):
+                stays[places[first + 1 : last]] = gaps[first + 1 : last] == 0.0
     return time[stays], coded[stays]
+
+
+def slide_rows(compiled: Compiled) -> list[range]:
+    """Return the rows of each relay that stands for a condition: where it is met, and two ends."""
+    nodes = compiled.schedule.nodes
+    begins = np.cumsum([0, *map(count_switching_functions, nodes)])
+    slides = (i for i, node in enumerate(nodes) if node.slide is not None)
+    return [range(begins[i], begins[i + 1]) for i in slides]
 
 
 def _crowds(gaps: np.ndarray, soon: float) -> Iterator[tuple[int, int]]:

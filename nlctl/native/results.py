@@ -14,6 +14,7 @@ from ..attributes import described_record
 from ..delays.variation import arrivals, variations_in
 from ..responses.breaks import jump_times
 from ..responses.event_log import NO_EVENTS, EventLog
+from ..wording import counted
 from .chattering.steps import Jump
 from .integrate.state import Status
 
@@ -42,6 +43,9 @@ class Statistics:
     # Conditions of the equations along which it has slid, as Filippov's solutions do: it has come
     # back to them from both sides, and was run again with an ideal relay for each.
     slides: tuple[str, ...] = ()
+    # When it has left one of these where both sides begin to lead away (s): there are several
+    # solutions from there on, of which a run takes one.
+    forks: tuple[float, ...] = ()
     rtol: float = np.nan  # Tolerances of steps; none in discrete time.
     atol: float = np.nan
 
@@ -50,6 +54,13 @@ class Statistics:
         """Along what it has slid, in words."""
         counts = Counter(self.slides).items()
         return ", ".join(f"{n} x {name}" if n > 1 else name for name, n in counts)
+
+    @property
+    def ways(self) -> str:
+        """Where it takes one of several solutions, in words."""
+        also = f", {counted(len(self.forks), 'time')} in all," if len(self.forks) > 1 else ""
+        first = f"at {min(self.forks):g} s{also} both sides lead away"
+        return f"{first}: there are several solutions, this is one"
 
 
 @dataclass(frozen=True, kw_only=True)

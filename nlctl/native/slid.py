@@ -37,7 +37,7 @@ from .equations.slides import (
     on_sides,
     others_of,
 )
-from .happened import row_labels, word_of
+from .happened import row_labels, slide_rows, word_of
 from .integrate.state import Status
 from .results import Trajectory
 
@@ -273,24 +273,24 @@ class SlidRun:
             )
         )  # fmt: skip
 
-    @property
-    def _has_slid(self) -> list[bool]:
-        """Whether each relay has slid: at a time of the run, or until an end that is noted."""
-        nodes, rows = self.compiled.schedule.nodes, self.reached.happened.label // 2
-        begins = np.cumsum([0, *map(count_switching_functions, nodes)])
-        return [
-            bool((np.abs(self.reached.states[nodes[i].state_offset, 1:]) < 0.5).any())
-            or bool(np.isin(rows, range(begins[i] + 1, begins[i + 1])).any())
-            for i in slide_places(nodes)
-        ]
-
     def named(self, reached: Trajectory) -> Trajectory:
-        """Return a run that says along what it has slid."""
-        whats = (
-            slide.what for (slide, _), slid in zip(self.slides, self._has_slid, strict=True) if slid
+        """Return a run that says along what it has slid, and when several ways led away."""
+        nodes, log = self.compiled.schedule.nodes, self.reached.happened
+        slides, forks = list[str](), set[float]()
+        places, rows = slide_places(nodes), slide_rows(self.compiled)
+        for (slide, _), i, (_, *ends) in zip(self.slides, places, rows, strict=True):
+            below, above = (set(log.time[log.label // 2 == row].tolist()) for row in ends)
+            modes = self.reached.states[nodes[i].state_offset, 1:]
+            if below or above or np.any(np.abs(modes) < 0.5):
+                block, what = slide.what
+                slides.append(f"{what} of block '{block}'")
+            forks |= below & above  # rates lead away on both sides at once
+        return replace(
+            reached,
+            statistics=replace(
+                reached.statistics, slides=tuple(slides), forks=tuple(sorted(forks))
+            ),
         )
-        names = tuple(f"{what} of block '{block}'" for block, what in whats)
-        return replace(reached, statistics=replace(reached.statistics, slides=names))
 
 
 def sliding(

@@ -173,6 +173,8 @@ class Response(ct.TimeResponseData):
             lines.append(f"  run      {run.status.name}, {steps}{turns}")
             if run.slides:
                 lines.append(f"  slides   along {run.along}")
+            if run.forks:
+                lines.append(f"  forks    {run.ways}")
             if run.called:
                 names = ", ".join(run.called)
                 lines.append(f"  called   {names}: a loop takes more passes than are written out")

@@ -83,6 +83,7 @@ _TOGETHER = "two things happen at one instant, and each alone at another if it i
 _GRAZING = "a condition is met at a rate of 0 (grazing), and may not be met if it is moved"
 _RETURNS = "a jump at a time that moves comes back through a delay that varies"
 _ENDLESS = "switches follow each other without end"
+_FORK = "the run leaves what it slides along where both sides lead away, by one of several ways"
 _LOST = "the derivatives cannot be integrated further, although the run itself can"
 _KINK = "the run stays on a kink, and on either side of it if it is moved"
 _FIRST = "what is driven at the start is at a kink or jump, and on either side of it if it is moved"
@@ -154,6 +155,7 @@ class _Run:
         together = self._resets_together()
         if together is not None:
             lacks.append(self._lack(together, _TOGETHER))
+        lacks += [self._lack(time, _FORK) for time in self.trajectory.statistics.forks]
         if self.trajectory.statistics.status is Status.ZENO:
             lacks.append(self._lack(self.trajectory.since, _ENDLESS))
         elif self.trajectory.statistics.status is Status.CHATTERING:

@@ -447,3 +447,25 @@ def test_a_fixed_step_has_an_end_as_well():
         nlctl.input_output_response(
             plain(from_both_sides, 1), times, 0, 0.0, step=0.01, slide=False
         )
+
+
+@methods
+def test_where_both_sides_lead_away_the_run_says_so(method):
+    """x' = -(1 - t) sign(x) rests until t = 1; then x = 0 and x = +-(t - 1)^2 / 2 are solutions."""
+    times = np.linspace(0, 3, 13)
+    run = nlctl.input_output_response(
+        plain(lambda t, x, u, p: [-(1 - t) * np.sign(x[0])], 1), times, 0, 0.2, method=method
+    )
+    assert run.statistics.forks == pytest.approx((1.0,), abs=1e-6)
+    assert "forks    at 1 s both sides lead away: there are several solutions" in str(run)
+    late = times > 1.1
+    assert np.abs(run.states[0, late]) == pytest.approx((times[late] - 1) ** 2 / 2, abs=1e-6)
+
+
+def test_where_one_side_leads_away_there_is_one_way():
+    run = nlctl.input_output_response(
+        plain(lambda t, x, u, p: [0.2 - (1 - t) * np.sign(x[0])], 1), [0, 1, 3], 0, 0.2
+    )
+    assert run.statistics.slides
+    assert run.statistics.forks == ()
+    assert "forks" not in str(run)

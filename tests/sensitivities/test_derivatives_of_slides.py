@@ -82,3 +82,49 @@ def test_levels_that_are_passed_and_one_along_which_it_slides():
     z = np.where(slides, 0.5 * (later[1] - later[0]) + times - second - a * later[1], z)
     assert by.derivatives[:, 0] == pytest.approx(np.array([x, z]), abs=1e-7)
     assert by.statistics.slides == ("floor of block 'loop'",)
+
+
+def test_masses_whose_friction_forces_are_not_all_determined():
+    """Two masses at rest on the ground and on each other, 3 signs: the first leaves at (F + R) / k.
+
+    Together they come to rest where (v1 + v2)' = k t - 2 F has taken 0.6 away.
+    """
+
+    def update(t, x, u, p):
+        v = x[2:]
+        between = p["R"] * np.sign(v[1] - v[0])
+        return np.concatenate(
+            [v, np.array([p["k"] * t + between, -between]) - p["F"] * np.sign(v)]
+        )  # fmt: skip
+
+    loop = ct.nlsys(
+        update, None, states=4, inputs=0, outputs=4, name="masses",
+        params={"F": 0.3, "R": 0.15, "k": 0.1},
+    )  # fmt: skip
+    times = np.linspace(0, 10, 6)
+    by = nlctl.sensitivity_response(
+        loop, times, 0, [0, 0, 0.3, 0.3], of=["y[0]", "y[1]"], with_respect_to=["F", "R", "k"],
+        rtol=1e-10, atol=1e-13,
+    )  # fmt: skip
+    assert not by.missing
+    stop = (0.3 - np.sqrt(0.06)) / 0.05
+    since, leaves = np.minimum(times, stop), np.maximum(times - 4.5, 0.0)
+    # x = 0.3 s - F s^2 / 2 + k s^3 / 12 with v(s) = 0, and k (t - (F + R) / k)^3 / 6
+    together = np.array([-(since**2) / 2, np.zeros_like(times), since**3 / 12])
+    alone = np.array([-(leaves**2) / 2, -(leaves**2) / 2, leaves**3 / 6 + 4.5 * leaves**2 / 2])
+    assert by.derivatives[0] == pytest.approx(together + alone, abs=1e-6)
+    assert by.derivatives[1] == pytest.approx(together, abs=1e-6)
+
+
+def test_there_is_no_derivative_behind_one_of_several_ways():
+    """x' = -(a - t) sign(x) slides until t = a, where both sides begin to lead away."""
+    loop = ct.nlsys(
+        lambda t, x, u, p: [-np.sign(x[0]) * (p["a"] - t)], None, states=1, inputs=0, outputs=1,
+        name="loop", params={"a": 1.0},
+    )  # fmt: skip
+    by = nlctl.sensitivity_response(loop, [0, 0.5, 0.9, 1.5, 2], 0, 0.2, with_respect_to=["a"])
+    (lack,) = by.missing
+    assert lack.time == pytest.approx(1.0, abs=1e-6)
+    assert "several ways" in lack.why
+    assert np.isfinite(by.derivatives[0, 0, :3]).all()
+    assert np.isnan(by.derivatives[0, 0, 3:]).all()
