@@ -282,8 +282,7 @@ class SlidRun:
             below, above = (set(log.time[log.label // 2 == row].tolist()) for row in ends)
             modes = self.reached.states[nodes[i].state_offset, 1:]
             if below or above or np.any(np.abs(modes) < 0.5):
-                block, what = slide.what
-                slides.append(f"{what} of block '{block}'")
+                slides.append(slide.name)
             forks |= below & above  # rates lead away on both sides at once
         return replace(
             reached,

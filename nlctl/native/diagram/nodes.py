@@ -24,6 +24,12 @@ class Slide:
     # whether that is at each integer of something: two conditions, of even ones and of odd ones
     integers: bool = False
 
+    @property
+    def name(self) -> str:
+        """What it is called: the first condition, and its block."""
+        block, what = self.what
+        return f"{what} of block '{block}'"
+
     def shares(self, other: Slide) -> bool:
         """Whether it has a condition that another one has."""
         apart = set(self.places).isdisjoint(other.places)

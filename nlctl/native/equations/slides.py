@@ -224,7 +224,7 @@ def _slides(reader: Reader, results: _Results, conditions: Conditions) -> list[_
         functions += [conditions.located[place].function for place in slide.places]
         changing = changing_at(graph, every, functions)
         if len(changing) != len(slide.sides):
-            raise CompileError(f"{_who(slide)} compares otherwise than where it was seen to jump")
+            raise CompileError(f"{slide.name} compares otherwise than where it was seen to jump")
         sides = zip(changing, slide.sides, strict=True)
         function = functions[0]
         if slide.integers:
@@ -260,7 +260,7 @@ def _derived(
     rates |= {m: graph.const(0.0) for node in reader.blocks for m in memory(node)}
     inputs = [
         SlidingInput(
-            name=_who(between.slide), leaf=between.leaf, kept=between.kept,
+            name=between.slide.name, leaf=between.leaf, kept=between.kept,
             limits=limits_of(reader, between.place),
             given=blended([between.function], [o for o in slides if o is not between])[0],
         )
@@ -370,8 +370,3 @@ def _changed(
 
 def _pieces(results: _Results) -> list[Expr]:
     return [e for rows in results.values() for _, array in rows for e, _ in array.pieces()]
-
-
-def _who(slide: Slide) -> str:
-    block, what = slide.what
-    return f"{what} of block '{block}'"
