@@ -7,6 +7,7 @@ from examples import crossed
 from own_relay import Side
 
 import nlctl
+from nlctl.analysis.paper.rivals import rival_controller
 from nlctl.native import Status
 from nlctl.native.chattering.detection import asked, new_paces
 from nlctl.native.integrate.state import METHOD, RUNNING, new_lanes
@@ -366,3 +367,17 @@ def test_a_quantised_sine_runs_to_its_end():
     made = nlctl.input_output_response(loop, [0, 2 * np.pi], 0, 0)
     assert len(made.events) == 4 * (2**12)
     assert abs(made.states[1, -1]) < 1e-7
+
+
+def test_ever_faster_levels_are_not_called_noise():
+    """Steps end within rounding of a level, where rates jump with the last digit of a state.
+
+    The noise of `reference.rough` is another thing: the quantiser is named with what it jumps
+    between, and not the rounding of states.
+    """
+    loop = nlctl.paper.EXAMPLES["example_1"](
+        actuator=nlctl.actuators.Quantiser(), controller=rival_controller("example_1", "PID")
+    )
+    words = r"'v' of block 'actuator' jumps between -?\d+\.\d and -?\d+\.\d; the run comes back"
+    with pytest.raises(nlctl.errors.ChatteringError, match=words):
+        nlctl.input_output_response(loop, np.linspace(0, 2, 201))

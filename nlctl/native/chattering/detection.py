@@ -120,16 +120,23 @@ def _roughness(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | None
     if task.times[-1] - now <= MOST_STEPS * length:
         return None
     looked_at = attempts[:: max(len(attempts) // _ROUGH_PLACES, 1)]
-    u, x = looked_at[-1].u[:, j], looked_at[-1].x[:, j]
+    u, x, t = looked_at[-1].u[:, j], looked_at[-1].x[:, j], float(looked_at[-1].t[j])
     scale = task.atol + task.rtol * np.abs(x)
+    points = [(float(a.t[j]), a.x[:, j]) for a in looked_at]
     found = rough_state(
         lambda t, z: evaluated(t, z, u)[: x.size],
-        [(float(a.t[j]), a.x[:, j]) for a in looked_at], length, np.broadcast_to(scale, x.shape),
+        [point for point in points if not _is_at_condition(evaluated, *point, u)], length,
+        np.broadcast_to(scale, x.shape),
     )  # fmt: skip
     if found is None:
         return None
-    t = float(looked_at[-1].t[j])
     return Jump(times=(t, t), before=x, after=next_to(x), inputs=u, is_rough=True)
+
+
+def _is_at_condition(evaluated: LaneEquations, t: float, x: np.ndarray, u: np.ndarray) -> bool:
+    """Whether a condition is within rounding of a state: a step has just ended behind it."""
+    signs = [np.sign(evaluated.switching(t, z, u)) for z in (next_to(x, -4.0), x, next_to(x, 4.0))]
+    return any(not np.array_equal(one, signs[0]) for one in signs)
 
 
 def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump | None:
