@@ -91,7 +91,7 @@ class Tracer:
     watched: tuple[tuple[np.ndarray, tuple[Expr, ...]], ...] = ()
     missing: Expr | None = None  # where this is None, as it was before something was chosen
     is_pythons: bool = False  # whether it is known to be a number of Python's own, not NumPy's
-    is_box: bool = False  # whether it is an array without axes, which NumPy tells from a number
+    is_box: bool | None = False  # whether it is an array without axes; None: in some branches
     is_column: bool = False  # whether it is a column of a table of pandas
     labels: Mapping[str, int] = field(default_factory=dict)  # of a column of pandas: where each is
 
@@ -314,6 +314,13 @@ class Tracer:
         array.watched = (self.watch(),)
         return array
 
+    @property
+    def is_array(self) -> bool:
+        """Whether it is an array for NumPy, with or without axes, and not a number."""
+        if self.is_box is None:
+            raise Untraceable("an array without axes in one branch, another in the other one")
+        return self.ndim > 0 or self.is_box
+
     def where_there(self) -> Tracer:
         """Return the array as it is where it is not None."""
         return self if self.missing is None else replace(self, missing=None)
@@ -460,9 +467,8 @@ def leaf_vector(
 
 def full(graph: Graph, shape: Any, value: object) -> Tracer:
     """Return an array of equal elements."""
-    shape = tuple(
-        operator.index(n) for n in (shape if isinstance(shape, list | tuple) else [shape])
-    )
+    several = isinstance(shape, list | tuple)
+    shape = tuple(map(operator.index, shape if several else [shape]))
     number = traced(graph, value)
     if number.size != 1 or number.only.kind != "f":
         raise Untraceable("an array that is filled with something else than one float")

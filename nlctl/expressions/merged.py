@@ -53,11 +53,12 @@ class Merger(ast.NodeTransformer):
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """Ask comparisons without a decision; of other values one of them is the result."""
         self.generic_visit(node)
-        return truth_test(node) if all(map(_is_question, node.values)) else node
+        asks = all(map(_is_question, node.values)) and not _binds(node)
+        return truth_test(node) if asks else node
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
-        if not node.orelse and isinstance(node.body[0], ast.Raise):
+        if not node.orelse and isinstance(node.body[0], ast.Raise) and not _binds(node.test):
             node.test = call_instead("fails", truth_test(node.test))
             return node
         if (appended := _appended([node])) is not None:
@@ -330,7 +331,7 @@ def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[],
 def _number(_: Graph, value: Any) -> Any:
     """Return a number, which another replaces; an array would change under all its names."""
     there = value.where_there() if isinstance(value, Tracer) else np.asarray(value)
-    if there.shape or (isinstance(there, Tracer) and there.is_box):
+    if there.shape or (isinstance(there, Tracer) and there.is_array):
         raise Untraceable("an array that is changed where a condition holds")
     return value
 
@@ -413,6 +414,8 @@ def chosen(graph: Graph, condition: Expr, one: object, other: object) -> Any:
         result.watched = (*a.watched, *b.watched, a.watch(), b.watch())
     elif len(kinds) > 1:
         graph.mixed.add(result.only)
+    if a.is_box is not False or b.is_box is not False:
+        result.is_box = None
     missing = graph.op("select", condition, a_missing, b_missing)
     result.missing = None if missing.op == "const" and not missing.data else missing
     return result

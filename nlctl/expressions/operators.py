@@ -439,7 +439,7 @@ def _ask_divisor(graph: Graph, a: object, b: object) -> None:
 
 def _in_place(name: str) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
-        if not (self.shape or self.is_box):
+        if not self.is_array:
             return _operator(name)(self, other)  # a number is not changed but replaced
         result = _OF_BITS.get(name, elementwise)(self.graph, name, self, other)
         if result.shape != self.shape:

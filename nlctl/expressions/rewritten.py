@@ -485,7 +485,7 @@ def _moved(graph: Graph, value: Any, limit: Any, step: Any, sign: float, strict:
             value = value - sign * step
         return value
     given = [traced(graph, v) for v in (value, limit, step)]
-    if any(v.shape or v.is_box for v in given) or given[0].only.kind != "f":
+    if any(v.is_array for v in given) or given[0].only.kind != "f":
         raise Untraceable("a loop whose end depends on what is computed")
     op = functools.partial(elementwise, graph)
     beyond = "gt" if sign > 0 else "lt"

@@ -243,7 +243,7 @@ class Stage:
         if isinstance(value, Tracer):
             return (
                 [np.ndarray]
-                if value.shape or value.is_box
+                if value.is_array
                 else [type(v) for v in NUMBER_SAMPLES[value.only.kind]]
             )
         cls = type(staged.settled(value))

@@ -379,6 +379,18 @@ def _changed_where_a_condition_holds(t, x, u, params):
     return [one]
 
 
+def _a_view_in_one_branch(t, x, u, params):
+    def moved(value, y):
+        part = np.array(value)
+        if value > 0.0:
+            part = y[0, ...]
+        part -= 1.0
+        return y[0] + part
+
+    y = np.array([x[0], 1.0])
+    return [sum(moved(x[0] - k, y) for k in range(8))]
+
+
 def _changed_in_a_loop(t, x, u, params):
     one = np.array(x[0])
     other = one
@@ -392,7 +404,7 @@ def test_an_array_without_axes_is_not_a_number(above):
     """It changes under all its names, and what asks for its type is told so."""
     for source in (
         _changed_under_two_names, _changed_in_a_view, _is_an_array, _type_is_an_array,
-        _changed_where_a_condition_holds, _changed_in_a_loop,
+        _changed_where_a_condition_holds, _changed_in_a_loop, _a_view_in_one_branch,
     ):  # fmt: skip
         system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
         compiled = nlctl.compile(system)
@@ -426,3 +438,24 @@ def test_what_follows_an_early_return_is_a_choice():
     for x in rng.normal(size=(40, 8)):
         wanted = system.dynamics(0.0, x, np.array([0.0]))
         np.testing.assert_allclose(compiled.dynamics(0.0, x, [0.0]), wanted, rtol=1e-14)
+
+
+def _named_in_a_test(value, limit):
+    rest = 0.0
+    if (limit > 0.5 and value > limit) or value < (rest := -limit):
+        return value
+    return limit + rest
+
+
+def test_a_name_that_a_test_gives_is_that_of_the_function():
+    """Three calls have more than a few ways; what is asked last gives a name its value."""
+    system = ct.nlsys(
+        lambda t, x, u, params: [_named_in_a_test(v, u[0]) for v in x], None,
+        states=3, inputs=1, outputs=3,
+    )  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    rng = np.random.default_rng(4)
+    for x, u in zip(rng.normal(size=(20, 3)), rng.normal(size=(20, 1)), strict=True):
+        wanted = system.dynamics(0.0, x, u)
+        np.testing.assert_array_equal(compiled.dynamics(0.0, x, u), wanted)

@@ -169,7 +169,7 @@ class Builtins:
         return isinstance(real, both)
 
     def _is_number(self, thing: Tracer, kinds: Any) -> bool:
-        if thing.shape or thing.is_box:
+        if thing.is_array:
             return isinstance(np.empty(0), kinds)
         answers = {isinstance(v, kinds) for v in NUMBER_SAMPLES[thing.only.kind]}
         if len(answers) > 1:
@@ -195,15 +195,14 @@ class Builtins:
     def _hasattr(self, thing: object, name: str) -> bool:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
-        is_array = thing.shape or thing.is_box
-        kinds = (np.empty(thing.shape),) if is_array else (0.0, np.float64(0.0), 0)
+        kinds = (np.empty(thing.shape),) if thing.is_array else (0.0, np.float64(0.0), 0)
         answers = {hasattr(number, name) for number in kinds}
         if len(answers) > 1:
             raise Untraceable(f"a question for {name} of a number")
         return answers.pop()
 
     def _type(self, thing: object, *rest: Any) -> Any:
-        if isinstance(thing, Tracer) and (thing.shape or thing.is_box or thing.is_pythons):
+        if isinstance(thing, Tracer) and (thing.is_array or thing.is_pythons):
             return np.ndarray if not thing.is_pythons else type(NUMBER_SAMPLES[thing.only.kind][0])
         if isinstance(thing, Tracer) and is_numpys(self.graph, thing):
             return type(NUMBER_SAMPLES[thing.only.kind][1])

@@ -169,10 +169,10 @@ _KEEPING = ("squeeze", "reshape")  # of an array; of a number there is another n
 
 def boxed(real: object, first: object, result: Any) -> Any:
     """Return the result of a function as an array without axes, where NumPy's is one."""
-    if not isinstance(result, Tracer) or result.shape or result.is_box or result.is_pythons:
+    if not isinstance(result, Tracer) or result.is_array or result.is_pythons:
         return result
     name = getattr(real, "__name__", type(real).__name__)
-    if name in _KEEPING and isinstance(first, Tracer) and (first.shape or first.is_box):
+    if name in _KEEPING and isinstance(first, Tracer) and first.is_array:
         return replace(result, is_box=True)  # the element itself: what is written goes there
     is_table = type(real).__module__.startswith("scipy.interpolate")
     return replace(result.copy(), is_box=True) if name in _BOXING or is_table else result
