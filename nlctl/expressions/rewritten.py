@@ -173,7 +173,7 @@ class _Rewriter(ast.NodeTransformer):
         return call_instead("item", node.value, _key(node.slice))
 
     def visit_Attribute(self, node: ast.Attribute) -> Any:
-        name = _ASKED_OF.get(self.generic_visit(node).attr)
+        name, _ = _ASKED_OF.get(node.attr), self.generic_visit(node)
         return call_instead(name, node.value) if name and type(node.ctx) is ast.Load else node
 
     def visit_Call(self, node: ast.Call) -> Any:

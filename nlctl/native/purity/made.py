@@ -290,7 +290,7 @@ def asks_what_is_there(function: object, places: Sequence[KnownValue]) -> bool:
     return inspect.getattr_static(thing, name, None) is not None
 
 
-def type_of(value: KnownValue) -> KnownValue:
+def class_of_value(value: KnownValue) -> KnownValue:
     """Return what is known of the class of something."""
     if isinstance(value.known, Unknown):
         return OUTSIDE
