@@ -91,6 +91,7 @@ class Tracer:
     watched: tuple[tuple[np.ndarray, tuple[Expr, ...]], ...] = ()
     missing: Expr | None = None  # where this is None, as it was before something was chosen
     is_pythons: bool = False  # whether it is known to be a number of Python's own, not NumPy's
+    is_box: bool | None = False  # whether it is an array without axes; None: in some branches
     is_column: bool = False  # whether it is a column of a table of pandas
     labels: Mapping[str, int] = field(default_factory=dict)  # of a column of pandas: where each is
 
@@ -210,6 +211,8 @@ class Tracer:
         if self.axis is None:
             cells = as_array(self.cells[tuple(keys)])
             place = self._place(keys[0]) if len(keys) == 1 else None
+            if not cells.shape and any(k is ... for k in (key if type(key) is tuple else [key])):
+                return Tracer(self.graph, as_array(self.cells[(*keys, ...)]), is_box=True)
             if not cells.shape:
                 return Tracer(self.graph, cells)
             return self._part(cells, None, 1, place)
@@ -265,7 +268,7 @@ class Tracer:
 
     def copy(self) -> Tracer:
         """Return a copy."""
-        return Tracer(self.graph, self.cells.copy(), self.axis, self.length)
+        return Tracer(self.graph, self.cells.copy(), self.axis, self.length, is_box=self.is_box)
 
     def ravel(self, order: str = "C") -> Tracer:
         """Return the array in one dimension: a view where NumPy's is one."""
@@ -289,6 +292,7 @@ class Tracer:
             return self._in_rows(target)
         place = self.place if self.ndim == len(target) == 1 else None
         array = self._part(self.cells.reshape(target), None, 1, place)
+        array.is_box = not target and (self.ndim > 0 or self.is_box)
         return array._as_long_if_many()
 
     def _in_rows(self, shape: tuple[int, ...]) -> Tracer:
@@ -309,6 +313,13 @@ class Tracer:
         array = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
         array.watched = (self.watch(),)
         return array
+
+    @property
+    def is_array(self) -> bool:
+        """Whether it is an array for NumPy, with or without axes, and not a number."""
+        if self.is_box is None:
+            raise Untraceable("an array without axes in one branch, another in the other one")
+        return self.ndim > 0 or self.is_box
 
     def where_there(self) -> Tracer:
         """Return the array as it is where it is not None."""
@@ -456,9 +467,8 @@ def leaf_vector(
 
 def full(graph: Graph, shape: Any, value: object) -> Tracer:
     """Return an array of equal elements."""
-    shape = tuple(
-        operator.index(n) for n in (shape if isinstance(shape, list | tuple) else [shape])
-    )
+    several = isinstance(shape, list | tuple)
+    shape = tuple(map(operator.index, shape if several else [shape]))
     number = traced(graph, value)
     if number.size != 1 or number.only.kind != "f":
         raise Untraceable("an array that is filled with something else than one float")

@@ -11,7 +11,7 @@ import ast
 import copy
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from .operators import elementwise
 INSTEAD_NAME = "{}@traced"  # of what stands for statements: no name that anybody has
 QUESTIONS = ("truth", "none")  # what is asked by functions instead of ``is``
 _BINDING = (ast.NamedExpr, ast.Yield, ast.YieldFrom, ast.Await)
+_SHARING = (ast.Global, ast.Nonlocal, ast.Yield, ast.YieldFrom, ast.Await)
 _MOST_PARTS = 400  # of a value that is written out of those before
 _Values = dict[str, tuple[ast.expr, ast.expr]]  # of what is assigned: where, and what
 
@@ -34,35 +35,37 @@ class Merger(ast.NodeTransformer):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
         """Return a choice at the end of a function that returns early."""
-        while len(node.body) > 1 and (value := _returned(node.body[-2:])) is not None:
-            node.body[-2:] = [ast.copy_location(ast.Return(value), node.body[-2])]
-        if (value := _returned(node.body[-1:])) is not None:
-            node.body[-1] = ast.copy_location(ast.Return(value), node.body[-1])
+        shared = any(isinstance(n, _SHARING) for n in ast.walk(node))
+        for k in [] if shared else reversed(range(len(node.body))):
+            first = node.body[k]
+            if _leaves(first) and (value := _returned(node.body[k:])) is not None:
+                node.body[k:] = [ast.copy_location(ast.Return(value), first)]
         self.generic_visit(node)
         return ast.fix_missing_locations(node)
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         """Write ``choice(c, lambda: a, lambda: b)`` for ``a if c else b``."""
         self.generic_visit(node)
-        if any(isinstance(n, _BINDING) for n in ast.walk(node)):
+        if _binds(node):
             return node
         return call_instead("choice", truth_test(node.test), later(node.body), later(node.orelse))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """Ask comparisons without a decision; of other values one of them is the result."""
         self.generic_visit(node)
-        return truth_test(node) if all(map(_is_question, node.values)) else node
+        asks = all(map(_is_question, node.values)) and not _binds(node)
+        return truth_test(node) if asks else node
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
-        if not node.orelse and isinstance(node.body[0], ast.Raise):
+        if not node.orelse and isinstance(node.body[0], ast.Raise) and not _binds(node.test):
             node.test = call_instead("fails", truth_test(node.test))
             return node
         if (appended := _appended([node])) is not None:
             return self.visit(ast.copy_location(ast.Expr(appended), node))
         values = _of_branches(copy.deepcopy(node))
         self.generic_visit(node)
-        if values is None or any(isinstance(n, _BINDING) for n in ast.walk(node)):
+        if values is None or _binds(node):
             return node
         self.count += 1
         test, result = (f"{name}@{self.count}" for name in ("test", "result"))
@@ -83,22 +86,57 @@ def _is_question(node: ast.expr) -> bool:
     """Whether the value of an expression is True or False."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
         return _is_question(node.operand)
-    asked = [INSTEAD_NAME.format(name) for name in QUESTIONS]
+    asked = [INSTEAD_NAME.format(name) for name in (*QUESTIONS, "logic")]
     by_name = isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     return isinstance(node, ast.Compare) or (by_name and node.func.id in asked)  # type: ignore[union-attr]
+
+
+def _binds(node: ast.AST) -> bool:
+    """Whether an expression gives somebody's variable a value, which others may read."""
+    binding = (n for n in ast.walk(node) if isinstance(n, _BINDING))
+    return not all(isinstance(n, ast.NamedExpr) and "@" in n.target.id for n in binding)
+
+
+def _leaves(node: ast.stmt) -> TypeGuard[ast.If]:
+    """Whether a branch may return."""
+    return isinstance(node, ast.If) and any(isinstance(n, ast.Return) for n in ast.walk(node))
 
 
 def _returned(body: Sequence[ast.stmt]) -> ast.expr | None:
     """Return what statements return, a choice where they do so early; None if they do more."""
     first = body[0] if body else None
-    if isinstance(first, ast.Return):
-        return first.value
-    if not isinstance(first, ast.If):
+    if first is None or isinstance(first, ast.Return):
+        return first and first.value
+    if _leaves(first):
+        yes, no = _returned(first.body), _returned([*first.orelse, *body[1:]])
+        if yes is None or no is None:
+            return None
+        return ast.copy_location(ast.IfExp(first.test, yes, no), first)
+    values, rest = _one(first), _returned(body[1:])
+    if rest is None or not values or any(isinstance(t, ast.Subscript) for t, _ in values.values()):
         return None
-    yes, no = _returned(first.body), _returned([*first.orelse, *body[1:]])
-    if yes is None or no is None or len(first.body) > 1:
+    return _after(values, rest, first)
+
+
+def _after(values: _Values, rest: ast.expr, like: ast.stmt) -> ast.expr | None:
+    """Return ``(y@2 := a, b)[-1]`` for what follows y = a: b reads y by that name."""
+    rest = copy.deepcopy(rest)
+    inside = list(ast.walk(rest))
+    bound = {n.arg for n in inside if isinstance(n, ast.arg)}
+    bound |= {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    if bound & values.keys():
         return None
-    return ast.copy_location(ast.IfExp(first.test, yes, no), first)
+    names = {name: f"{name}@of{len(inside)}" for name in values}
+    for node in inside:
+        if isinstance(node, ast.Name):
+            node.id = names.get(node.id, node.id)
+    parts: list[ast.expr] = [
+        ast.NamedExpr(ast.Name(names[name], ast.Store()), value)
+        for name, (_, value) in values.items()
+    ]
+    last = ast.UnaryOp(ast.USub(), ast.Constant(1))
+    whole = ast.Subscript(ast.Tuple([*parts, rest], ast.Load()), last, ast.Load())
+    return ast.copy_location(whole, like)
 
 
 def _appended(body: Sequence[ast.stmt]) -> ast.Call | None:
@@ -292,7 +330,8 @@ def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[],
 
 def _number(_: Graph, value: Any) -> Any:
     """Return a number, which another replaces; an array would change under all its names."""
-    if np.ndim(value) if not isinstance(value, Tracer) else value.where_there().shape:
+    there = value.where_there() if isinstance(value, Tracer) else np.asarray(value)
+    if there.shape or (isinstance(there, Tracer) and there.is_array):
         raise Untraceable("an array that is changed where a condition holds")
     return value
 
@@ -375,6 +414,8 @@ def chosen(graph: Graph, condition: Expr, one: object, other: object) -> Any:
         result.watched = (*a.watched, *b.watched, a.watch(), b.watch())
     elif len(kinds) > 1:
         graph.mixed.add(result.only)
+    if a.is_box is not False or b.is_box is not False:
+        result.is_box = None
     missing = graph.op("select", condition, a_missing, b_missing)
     result.missing = None if missing.op == "const" and not missing.data else missing
     return result

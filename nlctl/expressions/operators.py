@@ -429,6 +429,8 @@ def _ask_divisor(graph: Graph, a: object, b: object) -> None:
         frame = frame.f_back
     if not isinstance(frame.f_globals.get("__builtins__"), Namespace):
         return  # formulas of functions of NumPy divide as NumPy does
+    if isinstance(b, Tracer) and b.only.op == "cos":
+        return  # never 0: no number in a computer is an odd multiple of pi / 2
     if _is_pythons(a) and _is_pythons(b):
         graph.guard(elementwise(graph, "ne", b, 0.0).only, ZeroDivisionError)
     elif not (is_numpys(graph, a) or is_numpys(graph, b)):
@@ -437,7 +439,7 @@ def _ask_divisor(graph: Graph, a: object, b: object) -> None:
 
 def _in_place(name: str) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
-        if not self.shape:
+        if not self.is_array:
             return _operator(name)(self, other)  # a number is not changed but replaced
         result = _OF_BITS.get(name, elementwise)(self.graph, name, self, other)
         if result.shape != self.shape:

@@ -33,7 +33,7 @@ from .source import Definition, Unreadable, codes_in, definition
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
-_KEYS = (int, float, bool)
+_KEYS, _ASKED_OF = (int, float, bool), {"values": "values", "__class__": "type"}
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
           ast.Attribute, ast.With, ast.JoinedStr, ast.MatchSingleton, ast.MatchClass,
           ast.Is, ast.IsNot)  # fmt: skip
@@ -97,8 +97,7 @@ def _compiled(node: Definition, code: CodeType) -> CodeType:
     outer = ast.parse(f"def outer({', '.join(code.co_freevars)}): pass").body[0]
     assert isinstance(outer, ast.FunctionDef)
     assert isinstance(node, ast.FunctionDef)
-    node.name, node.decorator_list = _FOLLOWED, []  # where it calls itself, its name is global
-    outer.body = [node]
+    outer.body, node.name, node.decorator_list = [node], _FOLLOWED, []  # calls itself as a global
     module = ast.fix_missing_locations(ast.Module([outer], []))
     whole = compile(module, code.co_filename, "exec", dont_inherit=True)
     inside = _inside(_inside(whole, "outer"), _FOLLOWED)
@@ -174,8 +173,8 @@ class _Rewriter(ast.NodeTransformer):
         return call_instead("item", node.value, _key(node.slice))
 
     def visit_Attribute(self, node: ast.Attribute) -> Any:
-        self.generic_visit(node)
-        return call_instead("values", node.value) if node.attr == "values" else node
+        name, _ = _ASKED_OF.get(node.attr), self.generic_visit(node)
+        return call_instead(name, node.value) if name and type(node.ctx) is ast.Load else node
 
     def visit_Call(self, node: ast.Call) -> Any:
         if isinstance(node.func, ast.Attribute):  # a method: what it is asked of alone
@@ -291,10 +290,11 @@ def _is(name: str, node: ast.expr) -> bool:
     return isinstance(node, ast.Name) and node.id == name
 
 
-def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
+def names_for(graph: Graph, type_of: Any) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that a rewritten function has."""
     return names_of_choices(graph) | {
         INSTEAD_NAME.format("numbered"): NumberKeys,
+        INSTEAD_NAME.format("type"): type_of,
         INSTEAD_NAME.format("attempt"): functools.partial(_Attempt, graph),
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
         INSTEAD_NAME.format("item"): functools.partial(item_at, graph),
@@ -480,12 +480,12 @@ def _is_key(key: Tracer, k: object) -> Tracer:
 
 def _moved(graph: Graph, value: Any, limit: Any, step: Any, sign: float, strict: bool) -> Any:
     """Return what is left of a value from which steps are taken as long as it is beyond a limit."""
-    given = [value, limit, step]
-    if not any(isinstance(v, Tracer) for v in given):
+    if not any(isinstance(v, Tracer) for v in (value, limit, step)):
         while sign * value > sign * limit or (not strict and value == limit):
             value = value - sign * step
         return value
-    if any(traced(graph, v).shape for v in given) or traced(graph, value).only.kind != "f":
+    given = [traced(graph, v) for v in (value, limit, step)]
+    if any(v.is_array for v in given) or given[0].only.kind != "f":
         raise Untraceable("a loop whose end depends on what is computed")
     op = functools.partial(elementwise, graph)
     beyond = "gt" if sign > 0 else "lt"

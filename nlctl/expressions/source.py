@@ -106,13 +106,41 @@ def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeT
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python has said once what it thinks of this text
-        tree = ast.parse(text, file)
+        tree = _Private().visit(ast.parse(text, file))
         module = compile(text, file, "exec", flags=flags, dont_inherit=True)
     places: Places = {}
     for node in ast.walk(tree):
         if isinstance(node, Definition):
             places.setdefault((_name(node), _first_line(node)), []).append(node)
     return places, frozenset(codes_in(module)), {}
+
+
+class _Private(ast.NodeTransformer):
+    """Gives private names within a class, as self.__gain, those that Python knows them by."""
+
+    owner = ""
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        before, self.owner = self.owner, node.name.lstrip("_")
+        self.generic_visit(node)
+        self.owner = before
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        node.id = self._whole(node.id)
+        return node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        node.attr = self._whole(node.attr)
+        return self.generic_visit(node)
+
+    def visit_arg(self, node: ast.arg) -> ast.AST:
+        node.arg = self._whole(node.arg)
+        return self.generic_visit(node)
+
+    def _whole(self, name: str) -> str:
+        is_private = self.owner and name.startswith("__") and not name.endswith("__")
+        return f"_{self.owner}{name}" if is_private else name
 
 
 @functools.lru_cache(maxsize=128)

@@ -37,7 +37,7 @@ from .library.python import NUMBER_SAMPLES, Builtins, of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
-from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
+from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, boxed, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
 from .roots import roots
@@ -78,7 +78,7 @@ class Stage:
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
             is_users = not staged.is_of_a_library(function)
             code = followable_code(function, self.merging) if is_users else function.__code__
-            names.update(names_for(self.graph))
+            names.update(names_for(self.graph, self._builtins["type"]))
             copy = FunctionType(code, names, function.__name__, defaults, cells)
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
             keywords = (function.__kwdefaults__ or {}).items()
@@ -116,7 +116,7 @@ class Stage:
             given = staged.settled(arguments)
             if not staged.holds_tracers([*given, *options.values()]):
                 return of_numbers(*given, **options)
-            return called_object(self.graph, thing, *arguments, **options)
+            return boxed(thing, None, called_object(self.graph, thing, *arguments, **options))
 
         return function
 
@@ -242,7 +242,9 @@ class Stage:
         """Return the types that a value may have."""
         if isinstance(value, Tracer):
             return (
-                [np.ndarray] if value.shape else [type(v) for v in NUMBER_SAMPLES[value.only.kind]]
+                [np.ndarray]
+                if value.is_array
+                else [type(v) for v in NUMBER_SAMPLES[value.only.kind]]
             )
         cls = type(staged.settled(value))
         return [next((real for real, copied in self.classes.items() if copied is cls), cls)]
@@ -293,7 +295,8 @@ class Stage:
                 return of_numbers(*arguments, **options)
             if makes or staged.holds_tracers([*arguments, *options.values()]):
                 options = {k: unwrapped(v) for k, v in options.items()}
-                return written(self.graph, *map(unwrapped, arguments), **options)
+                result = written(self.graph, *map(unwrapped, arguments), **options)
+                return boxed(real, arguments[0] if arguments else None, result)
             return of_numbers(*arguments, **options)
 
         return function
@@ -409,7 +412,9 @@ class Stage:
             return cls
         if issubclass(cls, tuple):
             return self._copied_tuple(cls)
-        return self.copied_class(cls) if any(map(_has_code, vars(cls).values())) else cls
+        inherits = any(self._type(base) is not base for base in cls.__bases__)
+        has_code = inherits or any(map(_has_code, vars(cls).values()))
+        return self.copied_class(cls) if has_code else cls
 
     def _copied_tuple(self, cls: type) -> type:
         """Return a named tuple's class with methods that lead to the stage."""

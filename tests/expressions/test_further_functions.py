@@ -339,3 +339,123 @@ def test_values_that_are_repeated_over_places_are_left_to_numpy():
     compiled = nlctl.compile(ct.nlsys(update, None, states=3, inputs=1, outputs=3))
     (call,) = compiled.equations.calls.values()
     assert "repeated" in call.reason
+
+
+BY_PLACE = scipy.interpolate.interp1d([-40.0, 0.0, 40.0], [1.0, 2.0, 4.0])
+
+
+def _changed_under_two_names(t, x, u, params):
+    one = np.array(x[0])
+    other = one
+    other += 1.0
+    return [one + other]
+
+
+def _changed_in_a_view(t, x, u, params):
+    y = x.copy()
+    y[:1].squeeze()[...] += 1.0
+    element = y[:1].reshape(())
+    element *= 2.0
+    return y
+
+
+def _is_an_array(t, x, u, params):
+    made = [np.where(x[0] > 0, 1.0, 2.0), BY_PLACE(x[0]), np.copy(x[0]), np.asarray(x[0])]
+    numbers = [x[0], x.sum(), np.clip(x[0], 0.0, 1.0), np.array(x[0])[()]]
+    are = [isinstance(v, np.ndarray) and not np.isscalar(v) and hasattr(v, "__len__") for v in made]
+    return [float(all(are)) + 10.0 * sum(isinstance(v, np.ndarray) for v in numbers)]
+
+
+def _type_is_an_array(t, x, u, params):
+    return [1.0 if type(np.array(x[0])) is np.ndarray else 2.0]
+
+
+def _changed_where_a_condition_holds(t, x, u, params):
+    one = np.array(x[0])
+    other = one
+    for limit in range(8):
+        if x[0] > limit:
+            other += 1.0
+    return [one]
+
+
+def _a_view_in_one_branch(t, x, u, params):
+    def moved(value, y):
+        part = np.array(value)
+        if value > 0.0:
+            part = y[0, ...]
+        part -= 1.0
+        return y[0] + part
+
+    y = np.array([x[0], 1.0])
+    return [sum(moved(x[0] - k, y) for k in range(8))]
+
+
+def _changed_in_a_loop(t, x, u, params):
+    one = np.array(x[0])
+    other = one
+    while other > 1.0:
+        other -= 0.5
+    return [one]
+
+
+@pytest.mark.parametrize("above", [-1.0, 0.25, 3.0])
+def test_an_array_without_axes_is_not_a_number(above):
+    """It changes under all its names, and what asks for its type is told so."""
+    for source in (
+        _changed_under_two_names, _changed_in_a_view, _is_an_array, _type_is_an_array,
+        _changed_where_a_condition_holds, _changed_in_a_loop, _a_view_in_one_branch,
+    ):  # fmt: skip
+        system = ct.nlsys(source, None, states=1, inputs=1, outputs=1)
+        compiled = nlctl.compile(system)
+        wanted = system.dynamics(0.0, np.array([above]), np.array([0.0]))
+        assert compiled.dynamics(0.0, [above], [0.0]) == wanted, source.__name__
+
+
+def _returning_in_branches(value, limit):
+    if value > limit:
+        value = value - limit
+        test = value
+        value = 2.0 * test
+        return value + test
+    result = limit
+    if value < -limit:
+        value, result = result, value
+        return value - result
+    value += 1.0
+    return sum([value * k for k in (1.0, 2.0)]) + result
+
+
+def test_what_follows_an_early_return_is_a_choice():
+    """256 ways by eight calls; names that are assigned again have the values of their branch."""
+    system = ct.nlsys(
+        lambda t, x, u, params: [_returning_in_branches(v, 0.5) for v in x], None,
+        states=8, inputs=1, outputs=8,
+    )  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    rng = np.random.default_rng(3)
+    for x in rng.normal(size=(40, 8)):
+        wanted = system.dynamics(0.0, x, np.array([0.0]))
+        np.testing.assert_allclose(compiled.dynamics(0.0, x, [0.0]), wanted, rtol=1e-14)
+
+
+def _named_in_a_test(value, limit):
+    rest = 0.0
+    if (limit > 0.5 and value > limit) or value < (rest := -limit):
+        return value
+    return limit + rest
+
+
+def test_a_name_that_a_test_gives_is_that_of_the_function():
+    """Three calls have more than a few ways; what is asked last gives a name its value."""
+    system = ct.nlsys(
+        lambda t, x, u, params: [_named_in_a_test(v, u[0]) for v in x], None,
+        states=3, inputs=1, outputs=3,
+    )  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    rng = np.random.default_rng(4)
+    for x, u in zip(rng.normal(size=(20, 3)), rng.normal(size=(20, 1)), strict=True):
+        wanted = system.dynamics(0.0, x, u)
+        np.testing.assert_array_equal(compiled.dynamics(0.0, x, u), wanted)

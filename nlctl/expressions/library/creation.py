@@ -74,8 +74,11 @@ def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
 
 
 @of(np.array, makes=True)
-def array(graph: Graph, values: Any, dtype: Any = None, copy: bool = True, ndmin: int = 0) -> Any:
-    """Return numbers, lists and arrays as an array of its own."""
+def array(
+    graph: Graph, values: Any, dtype: Any = None, copy: bool = True, ndmin: int = 0,
+    order: str = "K",
+) -> Any:  # fmt: skip
+    """Return numbers, lists and arrays as an array of its own, in whatever order of memory."""
     if isinstance(values, PythonNumbers):
         return values.astype(dtype)
     if not holds_traced(values):

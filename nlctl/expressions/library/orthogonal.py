@@ -126,6 +126,8 @@ def pseudoinverse(graph: Graph, matrix: Tracer) -> Any:
 
 def root_of_matrix(graph: Graph, a: object) -> Tracer:
     """Return the square root of a matrix of two rows with eigenvalues to the right of 0."""
+    if (shape := traced(graph, a).shape) != (2, 2):
+        raise Untraceable(f"the square root of a matrix of shape {shape}")
     (p, q), (r, s) = _columns(graph, a)
     np_ = Facade(graph)
     _limited(graph, np_.isfinite(0.0 * p + 0.0 * q + 0.0 * r + 0.0 * s))

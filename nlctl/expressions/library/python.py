@@ -169,7 +169,7 @@ class Builtins:
         return isinstance(real, both)
 
     def _is_number(self, thing: Tracer, kinds: Any) -> bool:
-        if thing.shape:
+        if thing.is_array:
             return isinstance(np.empty(0), kinds)
         answers = {isinstance(v, kinds) for v in NUMBER_SAMPLES[thing.only.kind]}
         if len(answers) > 1:
@@ -195,13 +195,17 @@ class Builtins:
     def _hasattr(self, thing: object, name: str) -> bool:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
-        kinds = (np.empty(thing.shape),) if thing.shape else (0.0, np.float64(0.0), 0)
+        kinds = (np.empty(thing.shape),) if thing.is_array else (0.0, np.float64(0.0), 0)
         answers = {hasattr(number, name) for number in kinds}
         if len(answers) > 1:
             raise Untraceable(f"a question for {name} of a number")
         return answers.pop()
 
     def _type(self, thing: object, *rest: Any) -> Any:
+        if isinstance(thing, Tracer) and (thing.is_array or thing.is_pythons):
+            return np.ndarray if not thing.is_pythons else type(NUMBER_SAMPLES[thing.only.kind][0])
+        if isinstance(thing, Tracer) and is_numpys(self.graph, thing):
+            return type(NUMBER_SAMPLES[thing.only.kind][1])
         if is_traced(thing):
             raise Untraceable("the type of what is only known when it runs")
         if hasattr(type(thing), "_forwards"):

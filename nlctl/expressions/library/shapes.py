@@ -338,7 +338,7 @@ _OF_GRAPHS = (
      traced(graph, a).reshape(-1)[:, None] * traced(graph, b).reshape(-1)),
     ((np.shape,), lambda graph, values: traced(graph, values).shape),
     ((np.ndim,), lambda graph, values: traced(graph, values).ndim),
-    ((np.isscalar,), lambda graph, value: not traced(graph, value).shape),
+    ((np.isscalar,), lambda graph, v: not traced(graph, v).is_array),
 )  # fmt: skip
 for _functions, _written in _OF_GRAPHS:
     of(*_functions)(_written)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from types import FunctionType
 from typing import Any
 
@@ -160,6 +161,23 @@ def of_ufunc(
     return out
 
 
+_BOXING = ("array", "asarray", "asanyarray", "copy", "where", "select", "piecewise", "require",
+           "full", "zeros", "ones", "empty", "full_like", "zeros_like", "ones_like", "empty_like",
+           "tensordot", "splev")  # fmt: skip
+_KEEPING = ("squeeze", "reshape")  # of an array; of a number there is another number
+
+
+def boxed(real: object, first: object, result: Any) -> Any:
+    """Return the result of a function as an array without axes, where NumPy's is one."""
+    if not isinstance(result, Tracer) or result.is_array or result.is_pythons:
+        return result
+    name = getattr(real, "__name__", type(real).__name__)
+    if name in _KEEPING and isinstance(first, Tracer) and first.is_array:
+        return replace(result, is_box=True)  # the element itself: what is written goes there
+    is_table = type(real).__module__.startswith("scipy.interpolate")
+    return replace(result.copy(), is_box=True) if name in _BOXING or is_table else result
+
+
 def is_traced(value: object) -> bool:
     """Whether a value is one of expressions."""
     return isinstance(value, Tracer | Special)
@@ -177,7 +195,9 @@ def _method(array: Tracer, name: str) -> Any:
         raise Untraceable(text) if method else AttributeError(text)
     method = ARRAY_METHODS[name]
     if method in WRITTEN:  # a function that does the same
-        return lambda *rest, **named: written_out(array.graph, method, array, *rest, **named)
+        return lambda *rest, **named: boxed(
+            method, array, written_out(array.graph, method, array, *rest, **named)
+        )
     return lambda *rest, **named: method(
         array.graph, array, *map(unwrapped, rest), **{k: unwrapped(v) for k, v in named.items()}
     )

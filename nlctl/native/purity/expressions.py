@@ -410,9 +410,10 @@ class Expressions(ast.NodeVisitor):
         given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
-        if function.known is getattr:
+        if function.known is getattr or made.asks_what_is_there(function.known, places):
             names, others = names_read(*places)
-            return least_upper_bound([*(self.attribute(places[0], n) for n in names), *others])
+            read = least_upper_bound([*(self.attribute(places[0], n) for n in names), *others])
+            return read if function.known is getattr else FRESH
         before = self.walk.keeps
         try:
             result = self.made_once(node, self.walk.call(function, given))

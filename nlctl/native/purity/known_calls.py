@@ -366,7 +366,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
-        return OUTSIDE if isinstance(places[0].known, Unknown) else captured(type(places[0].known))
+        return made.class_of_value(places[0])
     if name in ("min", "max"):
         return least_upper_bound(
             [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]

@@ -12,7 +12,7 @@ import dataclasses
 import enum
 import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType, ModuleType
 from typing import Any, Generic, NamedTuple, Protocol
 
@@ -147,6 +147,8 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     new: Instance = base.known
     if name == OF_DICT:
         return attributes_of(walk, base)
+    if name == "__class__":
+        return captured(new.cls)
     values = [new.attributes[key] for key in dict.fromkeys((name, _ANY)) if key in new.attributes]
     member = inspect.getattr_static(new.cls, name, None)
     if name in new.attributes or member is None:
@@ -276,6 +278,23 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
         return None
     walk.captured(cls, name, function)
     return function
+
+
+def asks_what_is_there(function: object, places: Sequence[KnownValue]) -> bool:
+    """Whether ``hasattr`` asks for something that an object certainly has."""
+    thing, name = (*(value.known for value in places), None, None)[:2]
+    if function is not hasattr or not isinstance(name, str) or isinstance(thing, Unknown | Pure):
+        return False
+    if isinstance(thing, Instance):
+        return name in thing.attributes or inspect.getattr_static(thing.cls, name, None) is not None
+    return inspect.getattr_static(thing, name, None) is not None
+
+
+def class_of_value(value: KnownValue) -> KnownValue:
+    """Return what is known of the class of something."""
+    if isinstance(value.known, Unknown):
+        return OUTSIDE
+    return captured(value.known.cls if isinstance(value.known, Instance) else type(value.known))
 
 
 OF_ATTRIBUTES = {("vars", 1): attributes_of, ("setattr", 3): set_attribute}

@@ -247,7 +247,64 @@ class Endless:
             setattr(self, name, Endless(value) if isinstance(value, dict) else value)
 
 
+class Hidden:
+    """Names that are private, and classes that are asked for by an object."""
+
+    made = 0
+
+    def __init__(self):
+        self.__count, self.__buffer = 0, np.zeros(1)
+
+    def counted(self):
+        self.__count += 1
+        return self.__count
+
+    def added(self, x):
+        self.__buffer[0] += x
+        return self.__buffer
+
+    def __noted(self, x):
+        SEEN.append(x)
+        return x
+
+    def noted(self, x):
+        return self.__noted(x)
+
+    def of_class(self):
+        self.__class__.made += 1
+        return self.made
+
+    def of_type(self):
+        type(self).made += 1
+        return self.made
+
+    @property
+    def asked(self):
+        SEEN.append(1)
+        return 1.0
+
+
+def early(x):
+    """What follows an early return is noted."""
+    if x > 0:
+        return x
+    size = SEEN.append(x)
+    return x if size is None else 0.0
+
+
+HIDDEN = Hidden()
 CASES = {
+    "private number": lambda t, x, u, p: [HIDDEN.counted() * x[0]],
+    "private array": lambda t, x, u, p: HIDDEN.added(x[0]),
+    "private method": lambda t, x, u, p: [HIDDEN.noted(x[0])],
+    "class of an object": lambda t, x, u, p: [HIDDEN.of_class() * x[0]],
+    "class of an object inside": lambda t, x, u, p: [Hidden().of_class() * x[0]],
+    "type of an object": lambda t, x, u, p: [HIDDEN.of_type() * x[0]],
+    "type of an object inside": lambda t, x, u, p: [Hidden().of_type() * x[0]],
+    "a property that is asked for": lambda t, x, u, p: [x[0] if hasattr(HIDDEN, "asked") else 0.0],
+    "a property inside": lambda t, x, u, p: [x[0] if hasattr(Hidden(), "asked") else 0.0],
+    "after an early return": lambda t, x, u, p: [early(x[0])],
+
     "method that is hidden": lambda t, x, u, p: [Given(HIDES).law(x[0])],
     "cached method": lambda t, x, u, p: CACHED.law(1.0),
     "number of an object": lambda t, x, u, p: [hash(object()) * x[0]],

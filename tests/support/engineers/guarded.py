@@ -238,3 +238,55 @@ def friction_of_many(t, x, u, params):
         return np.sign(v)
 
     return np.array([u[0] - f(v) for v in x])
+
+
+def choked_flow(p_in, p_out, area):
+    if p_out <= 0:
+        return 0.0
+    ratio = p_in / p_out
+    if ratio >= 1.9:
+        return 0.7 * area * p_in
+    if ratio >= 1.0:
+        if p_in == 0:
+            p_in = 1e-9
+        head = p_in - p_out
+        head *= 2.0
+        return area * np.sqrt(head)
+    low, high = p_in, p_out
+    return -area * np.sqrt(2.0 * (high - low))
+
+
+@engineered(8)
+def valve_flows_of_many(t, x, u, params):
+    return [choked_flow(p, 1.0 + 0.1 * u[0], 0.3) - p for p in x]
+
+
+def between_walls(x, v, force):
+    low = (x <= 0 and force < 0) or x < -1
+    high = (x >= 1 and force > 0) or x > 2
+    if low or high:
+        return 0.0
+    rate = force - v
+    return rate if abs(rate) > 0.1 else 0.0
+
+
+@engineered(9)
+def pistons_between_walls(t, x, u, params):
+    return [between_walls(p, x[8], u[0]) for p in x]
+
+
+@engineered(3, 3)
+def euler_rates_with_a_message(t, x, u, params):
+    phi, theta = float(x[0]), float(x[1])
+    cos, sin = math.cos(theta), math.sin(theta)
+    try:
+        rates = np.array(
+            [
+                [1, math.sin(phi) * sin / cos, math.cos(phi) * sin / cos],
+                [0, math.cos(phi), -math.sin(phi)],
+                [0, math.sin(phi) / cos, math.cos(phi) / cos],
+            ]
+        )
+    except ZeroDivisionError:
+        print("there are no Euler angles at a pitch of 90 degrees")
+    return rates @ u - x

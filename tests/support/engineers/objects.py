@@ -220,3 +220,45 @@ def thrust_by_euler_angles(t, x, u, params):
 @engineered(3, 3)
 def thrust_by_rotation_vector(t, x, u, params):
     return Rotation.from_rotvec(x).apply(u) - x
+
+
+class Parts:
+    def __init__(self, parts):
+        self.__parts = np.array(parts, dtype=float, order="C")
+
+    def __scaled(self, by):
+        return self.__class__(by * self.__parts)
+
+    def __mul__(self, by):
+        return self.__scaled(by)
+
+    def __add__(self, other):
+        return type(self)(self.__parts + other.parts)
+
+    @property
+    def parts(self):
+        return self.__parts
+
+
+class Force(Parts):
+    limit = 2.0
+
+
+WIND = Force([0.5, -0.2])
+
+
+@engineered(2)
+def private_names_and_classes_of_objects(t, x, u, params):
+    total = Force(x) * -1.0 + WIND
+    if hasattr(total, "limit") and hasattr(WIND, "limit"):
+        return np.clip(total.parts, -total.limit, WIND.__class__.limit) + u[0]
+    return total.parts
+
+
+@engineered(2)
+def types_of_arrays_and_numbers(t, x, u, params):
+    error = u[0] - x[0]
+    if type(error) == np.ndarray:  # noqa: E721 (as people write it)
+        error = error[0]
+    assert type(x) is np.ndarray
+    return [x[1], error if type(error) in (float, np.float64) else 0.0]
