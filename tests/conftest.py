@@ -1,5 +1,6 @@
 """What tests have in common: hypothesis settings, one cache of machine code, marks, Ctrl-C."""
 
+import collections
 import gc
 import os
 import signal
@@ -57,6 +58,7 @@ def pytest_collection_modifyitems(items):
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
     What is ci is slow.
     """
+    part_rows(items)
     for item in items:
         values = item.callspec.params if hasattr(item, "callspec") else {}
         marked = any(item.get_closest_marker(name) for name in NEEDY)
@@ -64,6 +66,27 @@ def pytest_collection_modifyitems(items):
             item.add_marker("ci")
         if item.get_closest_marker("ci"):
             item.add_marker("slow")
+
+
+def part_rows(items):
+    """Count as weekly all but every third row of a test with the mark ``parted``.
+
+    Of combinations, those of each day have every value of each table.
+    """
+    rows = collections.defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("parted"):
+            tables = [mark.args[0] for mark in item.iter_markers("parametrize")]
+            names = [t.replace(" ", "").split(",") if isinstance(t, str) else [*t] for t in tables]
+            places, listed = item.callspec.indices, {name for table in names for name in table}
+            first = [table[0] for table in names] + [n for n in places if n not in listed]
+            rows[item.nodeid.partition("[")[0]].append((item, [places[name] for name in first]))
+    for each in rows.values():
+        lengths = sorted(len(set(column)) for column in zip(*(p for _, p in each), strict=True))
+        part = min(3, lengths[-2] if len(lengths) > 1 else lengths[-1])
+        for item, places in each:
+            if sum(places) % part:
+                item.add_marker("weekly")
 
 
 @pytest.fixture

@@ -132,6 +132,7 @@ def test_with_some_more_memory_it_runs_or_says_so(tmp_path, size):
     assert "Traceback" not in told.stderr
 
 
+@pytest.mark.weekly
 def test_few_threads_of_others_read_a_folder(done):
     """Those of pyarrow wait for ever where no memory is left to begin more."""
     script = (

@@ -25,6 +25,7 @@ def inside(times):
     return times[(times > 0) & (times < END)]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 @pytest.mark.parametrize(
     ("how", "arrival"),

@@ -84,6 +84,7 @@ def late_play(signal):
     return np.interp(PLACES, dense, through_play(late, R))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", TOLERANCES)
 @pytest.mark.parametrize("signal", [staircase, jumping_sine])
 def test_a_play_behind_a_delay_is_that_of_the_late_signal(signal, rtol):

@@ -132,6 +132,7 @@ def chains():
     return divided, added, multiplied
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("update", chains())
 def test_a_long_chain_is_run(update):
     """Whatever follows its parts does not call itself for each."""

@@ -50,6 +50,7 @@ def points_of(name):
     return st.lists(number, min_size=2, max_size=2, unique_by=lambda v: round(abs(v), 1))
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROWS)
 @given(data=st.data())
@@ -67,6 +68,7 @@ def test_each_partial_derivative_of_the_table(name, data):
         assert derivative(*x) == pytest.approx(wanted, rel=1e-8, abs=1e-8)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in ROWS if FUNCTIONS[name].enclosure])
 @given(data=st.data())
@@ -107,7 +109,7 @@ def apart(found, function, point):
     return np.where(smooth, np.abs(found - near) / np.maximum(1.0, np.abs(near)), 0.0), smooth
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_users_functions_against_richardson():
     """Wherever python-control's own function is smooth, its Jacobian is found to 1e-7."""
     rng, judged = np.random.default_rng(5), 0

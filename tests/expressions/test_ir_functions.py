@@ -136,6 +136,7 @@ def ulps(got, x, name):
     return worst
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(EXACT))
 def test_errors_are_at_most_an_ulp_or_two(name):

@@ -151,6 +151,7 @@ SEARCHES = [halved_steps, signed_steps, copied_signs, bits, arrays_of_brackets, 
             patterns, parameter_sought]  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("update", SEARCHES)
 def test_a_staircase_is_called_and_has_the_slope_of_differences(update):
     compiled = nlctl.compile(block(update))

@@ -8,6 +8,7 @@ import cloudpickle
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rows import each_row
@@ -105,6 +106,7 @@ def test_each_kind_in_front_of_a_lag(kind):
     assert made.statistics.events <= 2
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_in_python_control(kind):
@@ -231,7 +233,7 @@ class TestOnsets:
             np.testing.assert_allclose(s[far], signal(TIMES)[far], atol=1e-8)
 
     @given(some.integers(0, 10_000), some.floats(0.1, 10.0))
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_random_onset_follows_from_its_seed(self, seed, mean):
         """The same each time, and proportional to the mean; other seeds give others."""
         one = nlctl.Fault("a", "bias", 1.0, mean_time=mean, seed=seed)
@@ -248,6 +250,7 @@ class TestOnsets:
 class TestConditions:
     """A condition latches: the fault stays when it is no longer met."""
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @each_row(
         "when, begins",

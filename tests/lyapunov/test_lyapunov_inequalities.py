@@ -230,6 +230,7 @@ FORCINGS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("change", FORCINGS, ids=list(FORCINGS))
 def test_a_proof_with_the_forcing_in_g_holds_with_the_eps_of_that_g(change):

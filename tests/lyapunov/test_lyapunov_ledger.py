@@ -93,6 +93,7 @@ class FaultyPlant(nlctl.PureFeedback):
         return x2, rate
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("fault", range(5))
 def test_a_plant_of_many_cases_is_observed(fault):
     """Its rates are outputs next to its other cases; no loop of signals without a state appears."""

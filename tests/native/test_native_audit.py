@@ -103,6 +103,7 @@ DEFECTS = [swapped_operator, swapped_choice, slice_off_by_one, sum_without_its_l
            state_for_a_parameter]  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("defect", DEFECTS, ids=lambda defect: defect.__name__)
 def test_a_planted_defect_is_found(defect, monkeypatch):

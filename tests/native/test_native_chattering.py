@@ -217,6 +217,7 @@ def hand_friction(t, x, u, p):
     return u[0] - np.sign(x)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("drive", ["constant", "ramp", "sine"])
 @pytest.mark.parametrize(("rtol", "atol"), [(1e-8, 1e-10), (1e-6, 1e-8)])
 def test_chattering_is_found_between_dense_samples(drive, rtol, atol):

@@ -166,6 +166,7 @@ def test_without_a_rate_of_rest_it_ends_with_the_reason_and_the_time():
     assert run(system, times=[0.0, 1.0]).statistics.status is Status.OK
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
 @pytest.mark.parametrize(("damping", "offset"), [(20.0, 0.0), (8.0, 0.4)])
 def test_a_sign_behind_a_lag_ends_with_the_reason(method, damping, offset):

@@ -565,6 +565,7 @@ class TestSources:
         """Paths and processes do not count."""
         assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TEACHERS)]
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize(
         "name",
@@ -587,7 +588,7 @@ class TestSources:
             nlctl.compile(system).native  # noqa: B018
         assert (module_key(*TEACHERS), integrator_key()) == before
 
-    @pytest.mark.slow
+    @pytest.mark.weekly
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"

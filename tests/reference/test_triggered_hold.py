@@ -39,6 +39,7 @@ def samples(made):
     return rows["time"][(rows["block"] == "hold") & (rows["which"] == "guard 1")].to_numpy()
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.1, 0.3, 0.9])
@@ -77,6 +78,7 @@ def test_the_example_is_that_of_the_theorem():
     assert np.linalg.eigvalsh(Q)[0] / coupled > 0.05
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.slow
 @pytest.mark.parametrize("angle", [1.0, pytest.param(0.0, marks=pytest.mark.weekly)])
@@ -138,6 +140,7 @@ def with_threshold(threshold):
     return nlctl.interconnect(blocks, outputs=["u1"])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", [{"engine": "python-control"}, {}, {"method": "taylor"}])
 def test_a_threshold_that_falls_to_0_has_no_end_of_samples(how):
     """t_k+1 - t_k = (1 - t_k+1) / 2: 1 - (2 / 3)^k, and none from t = 1 on."""

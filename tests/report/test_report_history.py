@@ -127,6 +127,7 @@ def test_the_policy_allows_the_charts_by_hash_and_nothing_else():
     assert not [a for _, a in Reader(page).tags if "style" in a]
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_are_data_and_no_markup(name):

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import nlctl_here
-from examples import parted, some
+from examples import many, parted, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from resealed import reseal, write_chunk
@@ -385,7 +385,7 @@ def test_every_column_of_kept_rows_may_be_anything(run_of, tmp_path, how):
 
 
 @pytest.mark.weekly
-@settings(max_examples=80)
+@settings(max_examples=many(80))
 @given(data=st.data())
 @pytest.mark.parametrize("kind", KINDS_ASKED)
 def test_many_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data):

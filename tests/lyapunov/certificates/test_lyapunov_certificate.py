@@ -274,7 +274,7 @@ class TestVanDerPol:
         assert found.holds
         assert found.undecided == 0
 
-    @pytest.mark.slow
+    @pytest.mark.weekly
     def test_the_true_level_is_sharp(self):
         """Proved 1 % below it; 1 % above a point in the set is named where V' >= 0."""
         level = self.true_level()

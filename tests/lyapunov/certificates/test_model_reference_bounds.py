@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from examples import many
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -182,6 +183,7 @@ def test_a_function_that_a_network_does_not_span_is_bounded_on_the_box():
     assert better.W == (-0.9, 0.0, 0.9)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(("K", "closes"), [((1.5, 1.3), False), ((25.0, 10.0), True)])
 def test_a_network_of_wing_rock_needs_a_strong_model(K, closes):
@@ -329,7 +331,7 @@ def test_weights_of_ones_own_choice():
         certify(nlctl.paper.example_1(), W=(1.0,))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=many(50), deadline=None)
 @given(
     poles=st.lists(st.floats(0.2, 5.0), min_size=1, max_size=3),
     Q=st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3),

@@ -257,6 +257,7 @@ class TestNoneIsCertified:
         for loop in (first_order(sigma(), d=half_sine), wing_rock(sigma(nodes=6))):
             assert certify(loop).holds
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("what", REFUSED)
     def test_refused_by_name(self, what):
         """The refusal names the block, and what is wrong with it."""

@@ -26,6 +26,7 @@ def position(t, x, u, params):
     return x[0]
 
 
+@pytest.mark.parted
 @how
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_what_begins_at_0_and_leaves_it_is_an_event(how, way):
@@ -178,6 +179,7 @@ def test_steps_that_end_at_a_declared_break_point_note_it(method, step):
     np.testing.assert_allclose(declared(made), [1.0, 2.5], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parted
 @how
 def test_a_break_point_at_which_a_condition_jumps_is_noted_as_well(how):
     """The input of both conditions jumps where the signal is back: 0.6 instead of 0."""

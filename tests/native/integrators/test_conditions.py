@@ -166,6 +166,7 @@ def end(case, **how):
     return float(made.outputs[0, -1]), made
 
 
+@pytest.mark.parted
 @every_case
 @pytest.mark.parametrize(("method", "rtol"), HOW)
 def test_every_method_meets_them(case, method, rtol):
@@ -175,6 +176,7 @@ def test_every_method_meets_them(case, method, rtol):
     assert made.statistics.status is nlctl.native.Status.OK
 
 
+@pytest.mark.parted
 @every_case
 def test_the_reference_meets_them(case):
     found, _ = end(case, engine="python-control")

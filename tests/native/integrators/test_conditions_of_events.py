@@ -109,6 +109,7 @@ def seen(found, name):
     return own["time"].to_numpy(), own["direction"].tolist()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("method", "engine"), ENGINES)
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_event_functions_with_pulses(method, engine, rtol):

@@ -11,6 +11,7 @@ from typing import Any
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from numba.core import config
@@ -334,7 +335,7 @@ class TestSampledInput:
     """Inputs given as samples turn at the samples: clipping from sample to sample is exact."""
 
     @given(some.lists(some.floats(-4, 4), min_size=2, max_size=20), some.floats(-1, 1), some.data())
-    @settings(max_examples=25)
+    @settings(max_examples=many(25, part=4))
     def test_any_polygon(self, sampled, values, v0, data):
         """Whatever the polygon and its time grid."""
         widths = data.draw(
@@ -344,7 +345,7 @@ class TestSampledInput:
         np.testing.assert_allclose(made.outputs, followed(values, v0), atol=1e-9)
 
     @given(some.lists(some.floats(-4, 4), min_size=8, max_size=8), some.floats(0, 2))
-    @settings(max_examples=15)
+    @settings(max_examples=many(15, part=2))
     def test_the_play_preserves_order(self, sampled, values, more):
         """A larger input never gives a smaller output, and at most the slope times as much more."""
         times, values = np.arange(8.0), np.array(values)

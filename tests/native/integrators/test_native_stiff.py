@@ -229,7 +229,7 @@ def radau(update, end, x0):
 class TestKnownProblems:
     """Against an implicit Runge-Kutta method of another kind."""
 
-    @pytest.mark.slow
+    @pytest.mark.weekly
     @needs_jit
     @pytest.mark.parametrize("method", [pytest.param("rodas5p", marks=pytest.mark.ci), "auto"])
     def test_van_der_pol(self, method):

@@ -86,6 +86,7 @@ def flowing(f):
     )  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("name", "how"), ways(RATES))
 def test_integrals_of_pulses(name, how):
     f, integral = RATES[name]
@@ -96,6 +97,7 @@ def test_integrals_of_pulses(name, how):
         assert run.outputs[-1] == pytest.approx(integral, abs=1e-5)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("name", "how"), ways(OPEN))
 def test_integrals_of_pulses_with_parameters(name, how):
     f, integral = OPEN[name]

@@ -322,6 +322,7 @@ def blocks():
                     yield thing
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("record", list(blocks()), ids=lambda record: record.__name__)
 def test_nlctls_blocks_are_traced(record):

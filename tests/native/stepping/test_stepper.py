@@ -92,6 +92,7 @@ def stepped(made, u):
     return np.array(y).T, np.array(x).T
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_steps_are_one_run_bit_for_bit(name):
     """Memories, clocks, delays, events and the integrator's steps go on, also past a window."""
