@@ -73,20 +73,32 @@ def part_rows(items):
 
     Of combinations, those of each day have every value of each table.
     """
-    rows = collections.defaultdict(list)
+    tests = collections.defaultdict(list)
     for item in items:
         if item.get_closest_marker("parted"):
-            tables = [mark.args[0] for mark in item.iter_markers("parametrize")]
-            names = [t.replace(" ", "").split(",") if isinstance(t, str) else [*t] for t in tables]
-            places, listed = item.callspec.indices, {name for table in names for name in table}
-            first = [table[0] for table in names] + [n for n in places if n not in listed]
-            rows[item.nodeid.partition("[")[0]].append((item, [places[name] for name in first]))
-    for each in rows.values():
-        lengths = sorted(len(set(column)) for column in zip(*(p for _, p in each), strict=True))
+            tests[item.nodeid.partition("[")[0]].append(item)
+    for rows in tests.values():
+        places = [places_in(table, rows) for table in tables_of(rows[0])]
+        lengths = sorted(len(set(column)) for column in places)
         part = min(3, lengths[-2] if len(lengths) > 1 else lengths[-1])
-        for item, places in each:
-            if sum(places) % part:
+        for item, *place in zip(rows, *places, strict=True):
+            if sum(place) % part:
                 item.add_marker("weekly")
+
+
+def tables_of(item):
+    """Names of the values of each table of a test; parameters of fixtures are tables of one."""
+    names = [mark.args[0] for mark in item.iter_markers("parametrize")]
+    tables = [n.replace(" ", "").split(",") if isinstance(n, str) else [*n] for n in names]
+    listed = {name for table in tables for name in table}
+    return tables + [[name] for name in item.callspec.params if name not in listed]
+
+
+def places_in(table, rows):
+    """Which row of a table each row of a test has."""
+    places = {}
+    keys = [tuple(id(item.callspec.params[name]) for name in table) for item in rows]
+    return [places.setdefault(key, len(places)) for key in keys]
 
 
 @pytest.fixture

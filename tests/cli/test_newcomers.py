@@ -99,6 +99,7 @@ def make():
 '''
 
 
+@pytest.mark.weekly
 def test_an_engineer_has_a_page_of_a_loop_of_python_controls(tmp_path):
     """J w' = u - B w with u = e + integral of e: s^2 + 2.2 s + 2, so that -1.1 is the real part."""
     (tmp_path / "drive.py").write_text(ENGINEER, encoding="utf-8")

@@ -386,6 +386,7 @@ def test_a_refuted_level_has_a_point_where_v_does_not_fall():
             assert "V' >= 0" not in found.reason
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("lost", [
     lambda x: np.sqrt(np.abs(x[0]) - 0.05), lambda x: 0.01 * x[0] / (x[0] - 0.1) ** 2,
 ])  # fmt: skip

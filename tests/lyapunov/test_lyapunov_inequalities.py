@@ -86,6 +86,7 @@ def margins(signals, number=1):
     return {m.equation: m for m in inequalities(signals, premises(found(number)))}
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2])
 def test_the_steps_of_the_proof_agree_to_rounding(number):

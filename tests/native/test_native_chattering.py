@@ -324,7 +324,7 @@ def test_a_value_of_one_state_alone_is_no_run_without_end(method):
         assert passed.states[0] == pytest.approx(1 - 0.6 * np.exp(-times), abs=1e-7)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
     """Statuses, times and steps of nine members, together and three of them alone."""
     block = ct.nlsys(

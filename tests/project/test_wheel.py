@@ -112,6 +112,7 @@ def fresh_environment(folder, *what):
     return python, places
 
 
+@pytest.mark.weekly
 def test_wheel_runs_in_a_fresh_environment(wheel, tmp_path):
     """The console script lists, simulates and draws from an empty folder; the former name warns."""
     empty = tmp_path / "empty"

@@ -299,7 +299,7 @@ def test_a_relay_and_its_integral():
 waves = st.tuples(st.floats(0.5, 2), st.floats(0.3, 3), st.floats(0, 1), st.floats(3, 9))
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 @given(wave=waves)
 @settings(max_examples=many(10, part=3), deadline=None)
 def test_a_play_is_exact(wave):

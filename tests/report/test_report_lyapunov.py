@@ -155,6 +155,7 @@ def test_commands_in_the_text_are_python():
         compile(command, "command", "exec")
 
 
+@pytest.mark.weekly
 def test_the_part_is_in_the_papers_report_when_there_is_evidence():
     """With it: sections, figures, valid page, the same numbers in JSON.  Without: as before."""
     report = paper_report(made_up_runs(), proofs=found())
@@ -239,6 +240,7 @@ def test_a_burst_feeds_on_the_integral_of_the_nussbaum_function():
     assert slope * G[0] < r[-1] ** 2 / 2 / (upper - lower) < 1.01 * slope * G[1]
 
 
+@pytest.mark.weekly
 def test_no_word_of_the_figures_is_hidden():
     """With the run of Example 2 that the page shows; nothing is cut off or lies on a curve."""
     record = read_record(dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2))
@@ -359,6 +361,7 @@ def test_the_kept_record_goes_on_where_a_run_of_today_ends():
         continued(other, record)
 
 
+@pytest.mark.weekly
 def test_a_record_is_of_two_tolerances_that_agree():
     """To 5 s; the report then says both times."""
     late = burst()

@@ -334,6 +334,7 @@ def test_a_violation_that_is_not_confirmed_is_open(result):
     assert found["worst-case"] == found["sequential"] == ("not shown yet", "caution")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", ["Sobol'", "Latin hypercube", "corners"])
 def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     """Rows that are no independent draws give no statement about a probability."""
@@ -648,6 +649,7 @@ def test_labels_of_figures_are_short_and_can_be_drawn(name):
     assert not any(unicodedata.category(c).startswith("C") for c in label)
 
 
+@pytest.mark.weekly
 def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
     """From a study file, which is run first and taken up again, or from a folder, loop or not."""
     monkeypatch.chdir(tmp_path)

@@ -54,6 +54,7 @@ LOOPS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("make", LOOPS.values(), ids=LOOPS)
 def test_machine_code_is_python_control_from_sample_to_sample(make):
@@ -414,6 +415,7 @@ def variable():
     return nlctl.compile(nlctl.paper.example_1(controller=controller))
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("changed", SAMPLINGS.values(), ids=SAMPLINGS)
 def test_a_diagram_with_overrides_is_one_that_was_made_so(variable, changed):

@@ -90,6 +90,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("command", "name"),
     [("resume", name) for name in EDITS] + [("report", "an equation"), ("replay", "an equation")],
@@ -261,6 +262,7 @@ def test_what_was_edited_or_cut_off_is_refused_in_a_sentence(copied, number):
         assert len(told.stderr.strip().splitlines()) == 1, told.stderr
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("by", ["pandas", "bytes"])
 def test_edited_rows_are_refused_and_run_again(copied, done, by):
     """Whatever wrote them: a table without its seal is none of this run."""

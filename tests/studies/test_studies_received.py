@@ -218,6 +218,7 @@ def sent(home, base, place):
 FOLDERS = [".", "..", "/", "../..", "code", "{absolute}"]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("place", FOLDERS)
 def test_a_received_folder_executes_nothing(home, tmp_path, place):
     """Wherever it says that its code is; a page is made of its data, and what runs code refuses."""

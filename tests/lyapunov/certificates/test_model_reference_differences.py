@@ -294,6 +294,7 @@ class TestNoneIsCertified:
         assert not found.holds
         assert found.e == np.inf
 
+    @pytest.mark.weekly
     def test_a_regressor_without_a_bound(self):
         """Where psi has a pole in the box there is no bound of u, and no solution for all time."""
         basis = again(nlctl.controllers.WingRockRegressor, output=pole)

@@ -227,6 +227,7 @@ def ever_lost(p, horizon, leaves_out):
     return lost
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("p", [0.01, 0.1, 0.5])
 def test_the_sequence_fails_rarely_over_all_times(p):

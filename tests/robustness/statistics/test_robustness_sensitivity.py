@@ -234,7 +234,7 @@ def test_what_sets_failures_apart_is_found():
     assert by_arm.p_holm["x0"] > 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_p_values_of_idle_quantities_are_uniform():
     """Kolmogorov-Smirnov under the hypothesis: 5 % of p-values are below 0.05."""
     p = []
