@@ -230,6 +230,7 @@ class TestComparedControllers:
         loop = EXAMPLES[example](controller=compared_controllers(example)["certified"])
         assert certify(loop).C_0 < 1.0
 
+    @pytest.mark.parted
     @pytest.mark.ci
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_baselines_are_tuned(self, example):

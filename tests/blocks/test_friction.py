@@ -445,6 +445,7 @@ def test_stribecks_curve_between_its_levels_is_coulombs(v, F_c, sigma_2):
     assert one * v >= 0
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "kind",
     [

@@ -285,6 +285,7 @@ LIPSCHITZ = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", LIPSCHITZ)
 @given(data=st.data())
@@ -550,7 +551,7 @@ def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
     np.testing.assert_array_equal((distances == 0).any(axis=0)[moved != x], True)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
     """Several memories that reverse and touch together: the paper's Example 1 with one and four."""
@@ -565,6 +566,7 @@ def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
     assert steps[1] < 1.5 * steps[0]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", EVERY)
 def test_members_of_an_ensemble_are_single_runs(kind):
     """Memories that start elsewhere, side by side in lanes; sums add up in another order."""

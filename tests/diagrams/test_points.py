@@ -109,6 +109,7 @@ def test_points_past_the_end_of_a_function_are_left_out():
     assert far[0] > 0
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("enter", [
     lambda loop: overridden(loop, {"plant.k": 9.0, "gain.k": 9.0}),
     lambda loop: rates_and_outputs(loop, {"plant.k": 9.0})(0.0, np.zeros(2), np.zeros(1)),

@@ -138,6 +138,7 @@ FAR = {
 }  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 @pytest.mark.parametrize("name", FAR)
 def test_runs_end_at_narrow_event_functions(name, engine):

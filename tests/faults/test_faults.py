@@ -96,6 +96,7 @@ def faulty(kind, t, onset=AT):
     return np.where((t >= onset) & (t < end), formula(t), healthy(t))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_in_front_of_a_lag(kind):
     """The faulty signal at the samples, and y(end) to the tolerance, by machine code."""
@@ -121,6 +122,7 @@ def test_each_kind_in_python_control(kind):
 EXAMPLES = {"example-1": nlctl.paper.example_1, "example-2": nlctl.paper.example_2}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("example", EXAMPLES)
 @pytest.mark.parametrize("signal", ["actuator.v", "plant.x1", "controller.x1", "controller.law.u"])
 def test_a_fault_that_does_not_begin_changes_no_bit(example, signal):
@@ -383,6 +385,7 @@ class TestDelay:
         source = ct.nlsys(None, rising, inputs=0, outputs=["u"], name="source")
         return nlctl.interconnect({"source": source, "a": nlctl.Gain()}, outputs=["v"])
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("engine", ["native", "python-control"])
     @pytest.mark.parametrize("signal", ["source.u", "a.u"])
     def test_it_is_the_signal_of_before_while_it_lasts(self, signal, engine):

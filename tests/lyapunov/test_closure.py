@@ -79,6 +79,7 @@ def test_a_box_that_closes_is_the_least_fixed_point(p):
     assert all(b <= a for a, b in zip(closure.box, reach(closure.C_0), strict=True))
 
 
+@pytest.mark.weekly
 @settings(max_examples=many(12, part=2), deadline=None)
 @given(st.floats(1.31, 40.0))
 def test_where_the_map_grows_faster_than_the_box_none_closes(p):

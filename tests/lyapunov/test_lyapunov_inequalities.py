@@ -165,6 +165,7 @@ class WrongNussbaumLaw(nlctl.controllers.NussbaumLaw):
         return (-u[0] * (p.beta * u[0] + u[1] + u[2] + u[3]),)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("pieces", "broken"),
     [

@@ -219,6 +219,7 @@ def test_the_ledger_prints_tabulates_and_is_json():
 
 
 class TestFaults:
+    @pytest.mark.parted
     @pytest.mark.parametrize(
         ("member", "broken"),
         [

@@ -199,6 +199,7 @@ CANCELLING = {  # how long (s), and the rate
 }
 
 
+@pytest.mark.parted
 @pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="many steps without JIT")
 @pytest.mark.parametrize("kind", CANCELLING)
 def test_rounding_is_no_difference(kind):

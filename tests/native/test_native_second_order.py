@@ -57,6 +57,7 @@ def test_a_relay_behind_a_lag_comes_to_rest(T, method, rtol):
     assert np.abs(of_plant(made)[:, -1]).max() <= 1e-6
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("K", "rest_rate"), [(1.0, 4e-3), (2.0, 1e-3), (0.5, 1e-3), (10.0, 1e-3)])
 def test_it_switches_until_the_rate_is_that_of_rest(K, rest_rate):
     """J / A^2 = +-1 / K: from passage to passage 1 / |z| grows by 2 / (3 K), to 1 / rest_rate."""

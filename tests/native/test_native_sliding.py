@@ -60,6 +60,7 @@ class StepAt:
         return (t - p.time,)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
 @pytest.mark.parametrize("c", [-0.9, 0.0, 0.5])
 def test_what_comes_to_the_jump_stays_with_the_output_that_holds_it(c, method):
@@ -160,6 +161,7 @@ def test_a_hysteresis_converges_to_it_with_its_width(seed):
     assert apart[1] < apart[0] / 4
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_what_holds_of_every_relay(order):

@@ -351,6 +351,7 @@ def chain(count, sign):
     return update
 
 
+@pytest.mark.weekly
 def test_ten_masses_with_friction():
     times = np.linspace(0, 12, 13)
     run = nlctl.input_output_response(plain(chain(10, np.sign), 20), times, 0, 0)

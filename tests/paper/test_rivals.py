@@ -154,6 +154,7 @@ def test_the_record_is_of_the_study(example):
     assert rivals_text(record, example) in PAGE.read_text(encoding="utf-8")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "column",
     ["study", *(pytest.param(one, marks=pytest.mark.ci) for one in ("parameters", "rates"))],

@@ -168,6 +168,7 @@ def test_a_run_slides_where_the_shortest_steps_are_lost_in_the_rounding_of_a_sta
     assert ended.value.time == pytest.approx(0.195423, abs=1e-5)
 
 
+@pytest.mark.parted
 @methods
 @pytest.mark.parametrize(
     ("rate", "start", "end", "slides"),

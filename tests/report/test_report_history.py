@@ -231,6 +231,7 @@ def test_a_study_has_a_history_of_its_nominal_and_its_worst_run():
     assert chart(history)["data"][2] == [1.0, 9.0, None, None, None]
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_the_command_writes_an_interactive_page_of_a_study(tmp_path, monkeypatch):
     """With ``--interactive`` only; the page says what makes it again."""

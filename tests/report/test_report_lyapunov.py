@@ -75,6 +75,7 @@ def rows_by_key(number):
     return shown
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("number", [1, 2])
 def test_every_line_of_the_ledger_is_shown_once_with_its_status(number):
     """Nothing is left out, and the status is that of the ledger."""
@@ -381,6 +382,7 @@ def carried():
     return through_the_burst(burst())
 
 
+@pytest.mark.weekly
 def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
     """The proof is refuted; that signals stay bounded is open, whatever the burst looks like."""
     run = read_record(long_run(nlctl.paper.example_2(), 210.0))
@@ -415,6 +417,7 @@ def test_the_theorem_is_a_claim_without_long_runs_too():
     assert "Far beyond" not in report.verdict
 
 
+@pytest.mark.weekly
 @each_row("key", ["1", "2", "1-backlash", "2-dead-zone"])
 def test_following_is_a_bound_of_the_error(key):
     """Not agreement with numbers of others: a case just beyond the bound fails, and is named."""

@@ -348,6 +348,7 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     assert "not an estimate of a probability" in section.items[0].text
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_an_analysis_without_an_answer_says_why(result):
     """Of whatever kind: its section and its claim have the reason, and the others are as ever.
@@ -388,6 +389,7 @@ def test_the_page_holds_the_study(result, report, page, tmp_path):
     assert report.inputs["study.toml"] in Reader(page).text
 
 
+@pytest.mark.weekly
 def test_no_word_of_the_figures_is_hidden(report):
     """Labels and legends are whole, and lie on no curve, no bar and no other label."""
     made = {i.key: i.figure for s in report.sections for i in s.items if isinstance(i, Figure)}

@@ -500,6 +500,7 @@ def test_play_that_the_start_drives(sampled):
     assert np.allclose(made["y", "gap.c_r"], 0)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "law",
     [

@@ -39,6 +39,7 @@ def test_friction_is_found_from_data():
     assert fit.values[0] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.weekly
 def test_two_masses_with_friction_have_the_slopes_of_differences():
     def update(t, x, u, params):
         x1, v1, x2, v2 = x

@@ -77,6 +77,7 @@ def test_play_behind_square_waves():
     assert np.allclose(made["y", "source.A"], by_a, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "law",
     [

@@ -14,6 +14,7 @@ def nothing_from(made, t):
     return np.array_equal(known, made.time < t)
 
 
+@pytest.mark.weekly
 def test_two_conditions_at_one_instant():
     """x > p and y > q are met together: which is first decides."""
     plant = block(
@@ -118,6 +119,7 @@ def test_start_on_one_of_many_conditions():
     assert made["x", "plant.p[0]"][-1] == 0.0
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("law", "start"),
     [

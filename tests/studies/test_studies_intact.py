@@ -357,6 +357,7 @@ def test_other_formats_are_refused_by_name(copied, name, version):
         load_result(copied)
 
 
+@pytest.mark.weekly
 def test_a_run_that_continues_is_not_taken_for_intact(copied, done):
     """While it runs, or after a kill, the record is gone; --resume ends with the same one.
 

@@ -284,6 +284,7 @@ def test_edited_rows_are_refused_and_run_again(copied, done, by):
     pd.testing.assert_frame_equal(made.rows.table[columns], whole.rows.table[columns])
 
 
+@pytest.mark.weekly
 def test_what_no_key_can_see_is_told_when_it_runs_and_on_the_page(tmp_path):
     """Here a function that NumPy has made of another one."""
     path = write(tmp_path, HEAD, SEARCHES)

@@ -154,6 +154,7 @@ def test_a_name_that_a_file_has_imported_is_not_its_own(home, name):
     assert not (base / "ran").exists()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "name",
     ["control:set_defaults", "control:reset_defaults", "control:use_fbs_defaults",

@@ -39,6 +39,7 @@ def largest_energy(inequality, Gamma, P, span=8.0, count=801):
     return float(V[inequality(e, W_hat, d) > 0].max())
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("Gamma", "sigma_1"), [(5.0, 0.2), (2.0, 0.1), (20.0, 0.5), (1.0, 3.0)])
 def test_sigma_modification_is_at_most_completed_squares(Gamma, sigma_1):
     """V <= c max(1/k, 1/(Gamma sigma)), c = P D^2/k + sigma W^2; equal where k = Gamma sigma."""
@@ -297,6 +298,7 @@ def test_names_and_nesting_do_not_matter():
     assert certify(nested, params={"autopilot.weights.sigma_1": 0.4}).V_max != flat.V_max
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ["weights.Gamma", "error.Q", "model.b", "law.gain"])
 def test_each_parameter_of_the_run_is_the_one_of_the_proof(name):
     """As if the blocks had been made with it."""

@@ -268,6 +268,7 @@ def assert_caught(what):
     assert found[key].follows
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("what", QUICK)
 def test_faults_are_named(what):
@@ -279,6 +280,7 @@ OTHERS = [what for what in FAULTS if what not in QUICK]
 PARTS = [pytest.mark.ci, *[pytest.mark.weekly] * 5]  # a sixth in every `.ci/run`
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "what", [pytest.param(what, marks=PARTS[i % 6]) for i, what in enumerate(OTHERS)]
 )
@@ -351,6 +353,7 @@ def healthy(what):
     )
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("what", HEALTHY)
 def test_no_false_alarm(what):

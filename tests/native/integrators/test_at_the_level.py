@@ -142,6 +142,7 @@ def test_resets_at_given_times_are_rows_of_the_table(how):
     assert made.outputs.ravel()[-1] == pytest.approx(wanted, abs=1e-5)
 
 
+@pytest.mark.parted
 @how
 @pytest.mark.parametrize("width", [0.05, 0.005])
 def test_a_pulse_of_a_ten_thousandth_of_the_run(how, width):
@@ -171,6 +172,7 @@ def declared(made):
     return made.events["time"][made.events["block"].str.startswith("fault")].to_numpy()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("step", [0.25, 0.1])
 def test_steps_that_end_at_a_declared_break_point_note_it(method, step):

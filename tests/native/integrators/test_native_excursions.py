@@ -145,6 +145,7 @@ def beside_a_play():
     return nlctl.compile(loop)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @given(A=amplitudes, w=frequencies, d=beyond, gap=beyond, periods=st.integers(1, 3))
 @example(A=1.0, w=0.05, d=1e-6, gap=1e-6, periods=1)  # turns that rounding blurs
@@ -162,6 +163,7 @@ def test_nor_where_there_are_memories(method, A, w, d, gap, periods):
     assert run.outputs[1, -1] == pytest.approx(gap * A, rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @given(w=st.floats(0.3, 30), deep=st.floats(-3, -0.5).map(lambda power: 10.0**power))
 @settings(max_examples=many(25, part=4))

@@ -261,6 +261,7 @@ class TestTurningValues:
         exact = at_times(u_of, spec.turning_times(25.0), times)
         np.testing.assert_allclose(made.outputs[2], exact, atol=1e-9)
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("v0", [-5.0, -0.6, 0.0, 0.3, 0.72, 5.0])
     def test_it_starts_in_the_band(self, driven, v0):
         """A memory outside the gap is brought to its nearer side at t = 0, inside it stays."""
@@ -461,6 +462,7 @@ class TestExample2:
 
     FIGURES = {"x1": 0.155675746380, "x2": -0.02691235195, "zeta": 1.53306191709}
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_it_reaches_the_figures(self, loop, method):
         """x1, x2 and zeta at 20 s and the tail's largest error, computed independently."""

@@ -154,6 +154,7 @@ def test_behind_a_delay(name, heights, end):
     assert run.outputs[0, -1] == pytest.approx(wanted, abs=2e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
 @pytest.mark.parametrize("rtol", np.logspace(-11, -6, 11))
 def test_behind_a_condition_of_a_state(method, rtol):

@@ -359,6 +359,7 @@ def test_a_dead_zone_behind_a_sine_has_its_closed_form():
     assert np.max(np.abs(found.states - exact.states)) < 1e-9
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("kink", "integral"),
     [

@@ -129,6 +129,7 @@ def residuals(k, x, y, w):
     return np.cos(x) - 0.5 * y - y, 0.5 * p - q - w
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("x", [-1.0, 0.2, 3.0])
 @pytest.mark.parametrize("k", [0.3, -0.8])
 def test_loops_behind_each_other(k, x):

@@ -112,6 +112,7 @@ def test_functions_of_t_agree_to_the_tolerances(dt):
     assert np.ptp(y[0, round(19 / dt) :]) > 0.5  # the pulse at 20 s is seen
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_what_was_restored_goes_on_as_before(name):
     compiled, u = nlctl.compile(SYSTEMS[name]()), inputs(1, 40)

@@ -137,7 +137,7 @@ def test_a_linear_function_shares_by_its_variances_whatever_the_laws():
     assert (got.ST["idle"], got.ST_high["idle"]) == (0, 0)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_bootstrap_intervals_cover_and_repeat():
     """Of 40 designs most 90 % intervals hold the known share; one design has one interval."""
     covered = 0
