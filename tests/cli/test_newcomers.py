@@ -144,6 +144,7 @@ print("done")
 """
 
 
+@pytest.mark.weekly
 def test_a_veteran_finds_python_controls_habits(tmp_path):
     """Positional lists, short names, arrays of states, labels of states, describing functions."""
     script = tmp_path / "veteran.py"

@@ -121,6 +121,7 @@ def test_an_option_of_a_comparison_is_part_of_the_loop(copied, command):
     assert (told.returncode, "lag.gain was 0.4, now 0.5" in told.stderr) == (2, True), told
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("name", "command"),
     [("searches", "resume")]

@@ -363,7 +363,7 @@ KINDS_ASKED = [line[8:-1] for line in EVERY_KIND.splitlines() if line.startswith
 
 
 @pytest.mark.ci
-@settings(max_examples=4)
+@settings(max_examples=many(4, part=2))
 @given(data=st.data())
 @pytest.mark.parametrize("kind", parted(KINDS_ASKED))
 def test_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data):

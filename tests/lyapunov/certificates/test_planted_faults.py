@@ -277,12 +277,11 @@ def test_faults_are_named(what):
 
 
 OTHERS = [what for what in FAULTS if what not in QUICK]
-PARTS = [pytest.mark.ci, *[pytest.mark.weekly] * 5]  # a sixth in every `.ci/run`
+PARTS = [pytest.mark.ci, *[pytest.mark.weekly] * 11]  # a twelfth in every `.ci/run`
 
 
-@pytest.mark.parted
 @pytest.mark.parametrize(
-    "what", [pytest.param(what, marks=PARTS[i % 6]) for i, what in enumerate(OTHERS)]
+    "what", [pytest.param(what, marks=PARTS[i % 12]) for i, what in enumerate(OTHERS)]
 )
 def test_all_faults_are_named(what):
     """Each of them by the line that it breaks; most of them once a week."""
