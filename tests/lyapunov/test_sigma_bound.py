@@ -39,7 +39,6 @@ def test_the_function_falls_above_the_floor_of_completed_squares():
         assert falls <= -min(K, GAMMA * SIGMA) * V(z) + P * D**2 / K + SIGMA * W**2 + 1e-12
 
 
-@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("equations", "floor"),

@@ -567,7 +567,6 @@ class TestSources:
         """Paths and processes do not count."""
         assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TEACHERS)]
 
-    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize(
         "name",

@@ -78,7 +78,6 @@ def test_the_example_is_that_of_the_theorem():
     assert np.linalg.eigvalsh(Q)[0] / coupled > 0.05
 
 
-@pytest.mark.parted
 @engines
 @pytest.mark.slow
 @pytest.mark.parametrize("angle", [1.0, pytest.param(0.0, marks=pytest.mark.weekly)])

@@ -34,7 +34,6 @@ FIGURES = {
 EXTREMES = [np.inf, -np.inf, np.nan, 1e308, -1e308, 0.0, 1e-320]
 
 
-@pytest.mark.parted
 @pytest.mark.parametrize(
     ("values", "parts"),
     [
