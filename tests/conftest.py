@@ -1,5 +1,6 @@
 """What tests have in common: hypothesis settings, one cache of machine code, marks, Ctrl-C."""
 
+import collections
 import gc
 import os
 import signal
@@ -57,6 +58,7 @@ def pytest_collection_modifyitems(items):
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
     What is ci is slow.
     """
+    part_rows(items)
     for item in items:
         values = item.callspec.params if hasattr(item, "callspec") else {}
         marked = any(item.get_closest_marker(name) for name in NEEDY)
@@ -64,6 +66,39 @@ def pytest_collection_modifyitems(items):
             item.add_marker("ci")
         if item.get_closest_marker("ci"):
             item.add_marker("slow")
+
+
+def part_rows(items):
+    """Count as weekly all but every third row of a test with the mark ``parted``.
+
+    Of combinations, those of each day have every value of each table.
+    """
+    tests = collections.defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("parted"):
+            tests[item.nodeid.partition("[")[0]].append(item)
+    for rows in tests.values():
+        places = [places_in(table, rows) for table in tables_of(rows[0])]
+        lengths = sorted(len(set(column)) for column in places)
+        part = min(3, lengths[-2] if len(lengths) > 1 else lengths[-1])
+        for item, *place in zip(rows, *places, strict=True):
+            if sum(place) % part:
+                item.add_marker("weekly")
+
+
+def tables_of(item):
+    """Names of the values of each table of a test; parameters of fixtures are tables of one."""
+    names = [mark.args[0] for mark in item.iter_markers("parametrize")]
+    tables = [n.replace(" ", "").split(",") if isinstance(n, str) else [*n] for n in names]
+    listed = {name for table in tables for name in table}
+    return tables + [[name] for name in item.callspec.params if name not in listed]
+
+
+def places_in(table, rows):
+    """Which row of a table each row of a test has."""
+    places = {}
+    keys = [tuple(id(item.callspec.params[name]) for name in table) for item in rows]
+    return [places.setdefault(key, len(places)) for key in keys]
 
 
 @pytest.fixture

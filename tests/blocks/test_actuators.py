@@ -214,6 +214,7 @@ class TestBacklashInPythonControl:
             errors.append(abs(v[-1] - 1.5))
         np.testing.assert_allclose(np.log2(np.array(errors[1:]) / errors[:-1]), 2.0, atol=0.15)
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize(
         "changed", [{}, {"m_r": 1.5, "m_l": 0.8}, {"m_r": 0.8, "m_l": 1.5, "v0": 0.4}]
@@ -227,6 +228,7 @@ class TestBacklashInPythonControl:
         _, _, v, _ = respond(u, 8.0, **changed)
         np.testing.assert_allclose(v, exact(changed, u, 8.0, v.size), atol=2e-4)
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize(("amplitude", "r"), [(2.0, 0.5), (1.2, 0.3), (1.0, 0.8)])
     def test_the_loop_area_is_4_r_times_amplitude_minus_r(self, amplitude, r):

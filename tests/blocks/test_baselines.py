@@ -222,6 +222,7 @@ class TestComparedControllers:
             )
             assert law.spec.kappa == pytest.approx(-nlctl.functions.nussbaum(zeta), rel=2e-3)
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_certified_one_is_certified(self, example):
@@ -229,6 +230,7 @@ class TestComparedControllers:
         loop = EXAMPLES[example](controller=compared_controllers(example)["certified"])
         assert certify(loop).C_0 < 1.0
 
+    @pytest.mark.parted
     @pytest.mark.ci
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_baselines_are_tuned(self, example):
@@ -254,6 +256,7 @@ class TestComparedControllers:
             fits = (table["peak"] <= limit) & searched & (table.index > 0)
             assert np.all(table["iae"][fits] > 0.98 * table["iae"][0])
 
+    @pytest.mark.weekly
     def test_the_search_finds_the_gain_of_least_error(self):
         """x' = u, u = -k x within |u| <= 4 from x(0) = 2: k = 2, and the IAE is 1."""
 

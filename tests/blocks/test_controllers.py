@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
@@ -78,7 +79,7 @@ class TestFilteredError:
                 nlctl.controllers.FilteredError(lambdas=lambdas)
 
     @given(st.tuples(*[st.integers(-2, 6)] * 3))
-    @settings(max_examples=300)
+    @settings(max_examples=many(300))
     def test_degree_3_by_the_criterion_of_hurwitz(self, lambdas):
         """s^3 + a s^2 + b s + c with whole a, b, c: a > 0, c > 0, a b > c, in exact arithmetic."""
         a, b, c = lambdas
@@ -211,7 +212,7 @@ class TestJoined:
         assert np.shape(values["basis.centres"]) == (27, n)
 
     @given(inputs=vectors(5), zeta=st.floats(-2, 2), delta=numbers)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_pieces_left_out(self, inputs, zeta, delta):
         """Zero in the place of network, robust term or both: the terms of (23) disappear."""
         assume(abs(math.cos(math.pi / 2 * zeta)) > 1e-3)

@@ -254,6 +254,7 @@ class TestPythonControls:
         found = nlctl.describing_function(play, A, omega, params=params)
         assert found == pytest.approx(of_play(h), abs=1e-6)
 
+    @pytest.mark.weekly
     @given(width=st.floats(0.02, 0.3))
     @settings(max_examples=4, deadline=None)
     def test_the_simulated_cycle_of_a_relay_is_tsypkins(self, width):

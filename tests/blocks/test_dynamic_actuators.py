@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from actuator_rig import along, compiled, drive, values
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -20,7 +21,7 @@ class TestRateLimiter:
     """In machine code, with the ends of the limits located."""
 
     @given(rise=positive, K=st.floats(2, 50), step=positive)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_step_is_a_ramp_and_then_an_exponential(self, rise, K, step):
         """At rate `rise` up to step - rise / K, then with the time constant 1 / K."""
         spec = nlctl.RateLimiter(rise=rise, fall=-2 * rise, K=K)
@@ -33,7 +34,7 @@ class TestRateLimiter:
             np.testing.assert_allclose(run.outputs[0], sign * exact, atol=1e-8)
 
     @given(slope=st.floats(-0.9, 0.9), K=st.floats(5, 50))
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_slow_ramp_is_followed_at_a_distance(self, slope, K):
         """u - v = slope (1 - exp(-K t)) / K."""
         run = drive(nlctl.RateLimiter(K=K), times, slope * times, rtol=1e-10, atol=1e-12)
@@ -41,7 +42,7 @@ class TestRateLimiter:
         np.testing.assert_allclose(run.outputs[0], exact, atol=1e-9)
 
     @given(path=st.lists(inputs, min_size=3, max_size=8), rise=positive, fall=positive)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_the_rate_never_leaves_its_limits(self, path, rise, fall):
         """Between any two samples."""
         spec = nlctl.RateLimiter(rise=rise, fall=-fall, K=20.0)
@@ -56,7 +57,7 @@ class TestLags:
     """Against python-control's transfer functions."""
 
     @given(k=positive, T=positive)
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_a_first_order_lag_is_its_transfer_function(self, k, T):
         """k / (T s + 1)."""
         made = compiled(nlctl.Lag).linearize(0, 0, params=values(nlctl.Lag(k=k, T=T)))
@@ -64,7 +65,7 @@ class TestLags:
         np.testing.assert_allclose(made(1j * omega), k / (1 + 1j * omega * T), rtol=1e-12)
 
     @given(k=positive, omega=positive, zeta=positive)
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_a_second_order_lag_is_its_transfer_function(self, k, omega, zeta):
         """k omega^2 / (s^2 + 2 zeta omega s + omega^2)."""
         spec = nlctl.actuators.SecondOrderLag(k=k, omega=omega, zeta=zeta)
@@ -74,7 +75,7 @@ class TestLags:
         np.testing.assert_allclose(made(s), wanted(s), rtol=1e-11)
 
     @given(zeta=st.floats(0.05, 0.9))
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_a_step_overshoots_as_the_damping_ratio_says(self, zeta):
         """By exp(-pi zeta / sqrt(1 - zeta^2)) at half a period of the damped oscillation."""
         damped = np.sqrt(1 - zeta**2)

@@ -7,6 +7,7 @@ import control as ct
 import numpy as np
 import pytest
 from actuator_rig import compiled, drive, values
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -64,7 +65,7 @@ class TestDahl:
     """Force as a function of the path."""
 
     @given(moves=steps, sigma_0=positive, F_c=positive)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_along_a_path_the_force_is_made_of_exponentials(self, moves, sigma_0, F_c):
         """F -> +-F_c with the length F_c / sigma_0."""
         spec = nlctl.actuators.Dahl(sigma_0=sigma_0, F_c=F_c)
@@ -73,7 +74,7 @@ class TestDahl:
         assert np.all(np.abs(found) <= F_c * (1 + 1e-9))
 
     @given(moves=steps, data=st.data())
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_it_is_rate_independent(self, moves, data):
         """The same moves at other speeds."""
         spec = nlctl.actuators.Dahl(sigma_0=2.0)
@@ -91,7 +92,7 @@ class TestBoucWen:
     """Hysteretic force as a function of the path."""
 
     @given(moves=steps, gamma=positive, delta=st.floats(-0.9, 0.9), beta=positive, alpha=positive)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_along_a_path_it_is_made_of_exponentials(self, moves, gamma, delta, beta, alpha):
         """nu = 1: on either side of z = 0 one exponential of the position."""
         delta = round(delta * gamma, 6)
@@ -102,7 +103,7 @@ class TestBoucWen:
         assert np.all(np.abs(found) <= spec.z_max * (1 + 1e-7))
 
     @given(moves=steps, gamma=positive, share=st.floats(-0.9, 1), nu=st.floats(1, 3))
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_z_stays_below_its_bound(self, moves, gamma, share, nu):
         """From within it, for every exponent, and it is attained by a long move."""
         spec = nlctl.actuators.BoucWen(alpha=2, beta=1, gamma=gamma, delta=share * gamma, nu=nu)
@@ -145,14 +146,14 @@ class TestForcesOfThePath:
     """What is true of both: their force follows from the path alone."""
 
     @given(moves=steps, data=st.data())
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_they_are_rate_independent(self, spec, moves, data):
         """The same moves at other speeds."""
         times = data.draw(st.lists(st.floats(0.1, 10), min_size=len(moves), max_size=len(moves)))
         np.testing.assert_allclose(travel(spec, moves, times), travel(spec, moves), atol=1e-8)
 
     @given(one=steps, two=steps)
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_a_run_may_be_split(self, spec, one, two):
         """Going on from a saved state (semigroup)."""
         whole, first = travel(spec, one + two), travel(spec, one)
@@ -160,7 +161,7 @@ class TestForcesOfThePath:
         np.testing.assert_allclose(np.append(first, rest[1:]), whole, atol=1e-8)
 
     @given(moves=steps)
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_at_rest_they_keep_their_force(self, spec, moves):
         """To the bit: no velocity, no change (idempotence)."""
         force = travel(spec, moves)[-1]
@@ -168,7 +169,7 @@ class TestForcesOfThePath:
         assert run.states[0, -1] == force
 
     @given(far=positive, moves=steps)
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_cycles_burn(self, spec, far, moves):
         """Whatever came before, over a cycle of the position that has been gone through before."""
         start = travel(spec, [*moves, *[far, -far] * 20])[-1:]
@@ -224,7 +225,7 @@ class TestLuGre:
     """What the figures of Canudas de Wit et al. 1995 show, and their closed forms."""
 
     @given(v=st.floats(1e-4, 0.1), sign=st.sampled_from((-1, 1)))
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_at_a_constant_velocity_it_becomes_stribecks_curve(self, v, sign):
         """Section III: F = g(v) sign(v) + sigma_2 v, with the transient in closed form."""
         spec, v = nlctl.actuators.LuGre(), sign * v
@@ -360,7 +361,7 @@ class TestStickSlip:
         np.testing.assert_allclose(speed * times[1:] - run.outputs[0, 1:], stretch, atol=1e-8)
 
     @given(v=speeds, push=st.floats(-0.7, 0.7))
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_mass_slides_to_rest_and_stays(self, v, push):
         """After v^2 / 2 / (F_c -+ push) of way at a constant push below F_c."""
         times = np.linspace(0, 6, 25)
@@ -444,6 +445,7 @@ def test_stribecks_curve_between_its_levels_is_coulombs(v, F_c, sigma_2):
     assert one * v >= 0
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "kind",
     [
@@ -455,7 +457,7 @@ def test_stribecks_curve_between_its_levels_is_coulombs(v, F_c, sigma_2):
     ],
 )
 @given(v=st.floats(-2, 2), x=st.floats(-1, 1))
-@settings(max_examples=20)
+@settings(max_examples=many(20, part=4))
 def test_machine_code_equals_python_control(kind, v, x):
     """At random, and where the velocity or the state is 0."""
     spec = kind()

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from actuator_rig import along, compiled, dense, drive, values
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -149,7 +150,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_machine_code_equals_python_control_at_break_points(self, kind, data):
         """Right-hand side and output, at random and with u and memory on every corner."""
         spec = data.draw(EVERY[kind])
@@ -167,7 +168,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_it_is_rate_independent(self, kind, data):
         """The same path at other times makes the same outputs, to the bit."""
         spec, path = data.draw(EVERY[kind]), data.draw(paths)
@@ -179,7 +180,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_run_may_be_split(self, kind, data):
         """Going on from a saved state equals going on, to the bit (semigroup)."""
         spec, one, two = data.draw(EVERY[kind]), data.draw(paths), data.draw(paths)
@@ -190,7 +191,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_it_does_not_depend_on_the_solver(self, kind, data):
         """Explicit or stiff, at another tolerance, with fixed steps that meet no turning point."""
         spec, path = data.draw(EVERY[kind]), data.draw(paths)
@@ -206,7 +207,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=10)
+    @settings(max_examples=many(10, part=2))
     def test_cycles_turn_one_way(self, kind, data):
         """Once it has been through, a cycle of u encloses v counterclockwise, or clockwise."""
         spec, (a, b) = data.draw(EVERY[kind]), data.draw(st.tuples(inputs, inputs))
@@ -217,7 +218,7 @@ class TestEveryOperator:
         assert sense * integral(v[801:], u[801:]) >= -rest
 
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_constant_input_keeps_the_output(self, kind, data):
         """Applied to what it has become, the operator changes nothing (idempotence)."""
         spec, path = data.draw(EVERY[kind]), data.draw(paths)
@@ -226,7 +227,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_closed_minor_loops_leave_no_trace(self, kind, data):
         """After a <= c <= b the path a, b, c, b goes on as a, b does (wiping out)."""
         spec, before = data.draw(EVERY[kind]), data.draw(paths)
@@ -239,7 +240,7 @@ class TestEveryOperator:
 
     @pytest.mark.slow
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_minor_loops_between_equal_inputs_are_congruent(self, kind, data):
         """Whatever came before, the loop between a and b is the same but for a shift of v."""
         spec, (a, b) = data.draw(EVERY[kind]), data.draw(st.tuples(inputs, inputs))
@@ -250,7 +251,7 @@ class TestEveryOperator:
         np.testing.assert_allclose(np.diff(loops[0]), np.diff(loops[1]), atol=1e-12)
 
     @given(data=st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_the_output_is_admissible_from_the_first_instant(self, kind, data):
         """For every first input and every memory: in the band of that input."""
         spec, u = data.draw(EVERY[kind]), data.draw(inputs)
@@ -284,6 +285,7 @@ LIPSCHITZ = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", LIPSCHITZ)
 @given(data=st.data())
@@ -432,7 +434,7 @@ class TestGeneralisedPlays:
     """With the default weights and thresholds: those of `three_plays`, and a play without gap."""
 
     @given(path=paths)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_with_equal_envelopes_it_is_a_sum_of_plays_behind_a_characteristic(self, path):
         """A play of half gap 0 is that characteristic itself."""
         envelope = (2.0, 0.5, 0.3, -0.1)
@@ -451,7 +453,7 @@ class TestGeneralisedPlays:
         np.testing.assert_allclose(np.log2(apart[:-1]) - np.log2(apart[1:]), 2.0, atol=0.05)
 
     @given(c=st.floats(0.1, 1.5), height=positive)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_the_area_between_saturations_that_are_apart_by_2_c(self, c, height):
         """The integral of h (tanh(u + c) - tanh(u - c)) over all u is 4 c h."""
         one = compiled(nlctl.actuators.GeneralisedPrandtlIshlinskii, (("w", (1.0,)), ("r", (0.0,))))
@@ -462,6 +464,7 @@ class TestGeneralisedPlays:
         assert -integral(run.outputs, u) == pytest.approx(4 * c * height, rel=1e-4)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", EVERY)
 def test_in_python_control_the_memories_are_committed(kind):
@@ -548,7 +551,7 @@ def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
     np.testing.assert_array_equal((distances == 0).any(axis=0)[moved != x], True)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
     """Several memories that reverse and touch together: the paper's Example 1 with one and four."""
@@ -563,6 +566,7 @@ def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
     assert steps[1] < 1.5 * steps[0]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", EVERY)
 def test_members_of_an_ensemble_are_single_runs(kind):
     """Memories that start elsewhere, side by side in lanes; sums add up in another order."""

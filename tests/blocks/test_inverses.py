@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 import pytest
 from actuator_rig import along
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -84,7 +85,7 @@ class TestPrandtlIshlinskii:
         np.testing.assert_allclose(found, wanted, atol=1e-11 * (1 + max(map(abs, wanted))))
 
     @given(spec=operators())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_the_inverse_is_an_operator_whose_inverse_is_the_first(self, spec):
         """Weights, thresholds and memories of the inverse's inverse."""
         one = inverse_of(spec)
@@ -100,7 +101,7 @@ class TestPrandtlIshlinskii:
         np.testing.assert_allclose(list(two.initial.values()), spec.v0, atol=1e-11)
 
     @given(spec=operators())
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_loading_curves_mirror_each_other(self, spec):
         """From rest at 0: slope 1 / m between the images of the thresholds."""
         made = inverse_of(spec).derived()
@@ -134,7 +135,7 @@ class TestBacklash:
     """Tao and Kokotovic's inverse, which jumps where its input reverses."""
 
     @given(a=positive, b=positive, m_r=positive, m_l=positive, c_l=st.floats(-1, 1), gap=positive)
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_backlash_behind_its_inverse_is_the_identity(self, a, b, m_r, m_l, c_l, gap):
         """After the gap has been crossed, at every time; whether slopes are equal or not."""
         own = {"m_r": m_r, "m_l": m_l, "c_l": c_l, "c_r": c_l + gap}

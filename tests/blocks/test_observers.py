@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.special
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -67,7 +68,7 @@ class TestLuenberger:
         np.testing.assert_allclose(error, exact, atol=1e-7)
         np.testing.assert_allclose(np.poly(closed), np.poly(poles), rtol=1e-9)
 
-    @settings(max_examples=20, deadline=None)
+    @settings(max_examples=many(20, part=4), deadline=None)
     @given(st.integers(0, 10_000))
     def test_poles_of_random_plants(self, seed):
         """With two outputs, and a direct path from u to y."""
@@ -256,6 +257,7 @@ class TestExtendedKalmanFilter:
             exact = [[1 - 4 * abs(v) * z, -2 * abs(v) * v]]
             np.testing.assert_allclose(made(np.array([v, z])), exact, rtol=0, atol=1e-5)
 
+    @pytest.mark.parted
     @every_engine
     def test_a_pendulum_is_found_from_its_angle(self, engine):
         """From an error of 1 rad and 1 rad/s, without noise; everything is machine code."""

@@ -49,6 +49,7 @@ class TestUnsaturated:
             found = linear(1j * omega)[0]
             np.testing.assert_allclose(found, [of_ref(1j * omega), -of_y(1j * omega)], rtol=1e-9)
 
+    @pytest.mark.parted
     @every_engine
     @each_row(("b", "c"), [(1.0, 1.0), (0.4, 0.0)])
     def test_step_responses_of_the_closed_loop(self, b, c, engine):
@@ -152,6 +153,7 @@ class TestAntiWindup:
         _, states = alone(nlctl.PID2(**self.PI, T_t=0.1, anti_windup="clamping"), t, e=1.0)
         np.testing.assert_array_equal(states[0], 0.0)  # at the limit from the first instant on
 
+    @pytest.mark.parted
     @every_engine
     def test_recovery_from_a_limit(self, engine):
         """After 10 s at e = 0.25, e = -0.25: u leaves its limit when I has fallen to 1.5.

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -27,6 +28,7 @@ def slope(plant, t, x, v, params=None):
 
 
 class TestPureFeedback:
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize("order", range(1, 6))
     def test_a_linear_plant_is_a_state_space_system(self, order):
@@ -115,7 +117,7 @@ class TestForcedDuffing:
         assert got == pytest.approx(expected, rel=1e-12, abs=1e-11)
 
     @given(t=times, mean=st.floats(0, 2), ripple=st.floats(-1, 1))
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_the_integral_phase_is_the_integral_of_w(self, t, mean, ripple):
         """Forcing q cos(int_0^t w), by quadrature."""
         phase, _ = quad(lambda s: mean + ripple * np.sin(s), 0, t, epsabs=1e-12, limit=200)

@@ -81,6 +81,7 @@ def filtered_step(spec, t):
 
 
 class TestFilteredStep:
+    @pytest.mark.parted
     @pytest.mark.parametrize("order", range(4))
     def test_it_is_the_step_response_of_the_filter(self, order):
         """Simulated, in closed form and by python-control's transfer function."""

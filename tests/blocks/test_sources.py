@@ -53,6 +53,7 @@ class TestNothingIsSteppedOver:
         expected = 20 * 0.7 * 2.0 * (-0.4) + 0.14 * 2.0
         assert integral(spec, 20.2 * 0.7, engine) == pytest.approx(expected, rel=1e-7)
 
+    @pytest.mark.parted
     @every_engine
     @each_row("periodic", [False, True])
     def test_a_spike_in_a_table(self, periodic, engine):

@@ -118,7 +118,7 @@ def test_grid_layouts_are_the_transcriptions_grids(layout):
     centres = paper.grid_centres([int(c) for c in layout.split("x")])
     diagram = make_diagram(1, "dead_zone", centres=layout)
 
-    @settings(max_examples=20, deadline=None, derandomize=True)
+    @settings(max_examples=many(20, part=4), deadline=None, derandomize=True)
     @given(states(2, 27), parameters(1))
     def check(state, both):
         check_rhs(1, "dead_zone", diagram, centres, 1.5, state, both)
@@ -131,7 +131,7 @@ def test_integral_phase_is_the_transcriptions():
     diagram = make_diagram(1, "dead_zone", phase="integral")
     centres = paper.diagonal_centres(27, 2)
 
-    @settings(max_examples=30, deadline=None, derandomize=True)
+    @settings(max_examples=many(30, part=4), deadline=None, derandomize=True)
     @given(st.floats(0, 200), states(2, 27), parameters(1))
     def check(t, state, both):
         check_rhs(1, "dead_zone", diagram, centres, t, state, both, phase="integral")

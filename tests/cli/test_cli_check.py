@@ -56,6 +56,7 @@ def test_the_published_loop_holds_and_the_papers_lemma_does_not():
     assert lines["(29)"]["status"] == "proved"
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_runs_of_python_control_are_reproduced_and_give_the_same_ledger():
     """Two engines, one loop: the same statuses, and margins that agree to the runs' tolerance."""

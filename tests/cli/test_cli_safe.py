@@ -73,6 +73,7 @@ def test_orders_are_spelt_out(text):
     assert in_json({text: [text]}).replace("\n", "").isprintable()
 
 
+@pytest.mark.parted
 @pytest.mark.skipif(os.name != "posix", reason="modes of files are POSIX's")
 @pytest.mark.parametrize("mask", [0o077, 0o027, 0o002, 0o000])
 def test_files_obey_the_umask(tmp_path, mask):
@@ -112,13 +113,8 @@ def test_under_a_memory_limit_a_run_ends_with_a_message(tmp_path, command, size)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="address space is limited on Linux")
-@pytest.mark.parametrize(
-    "size",
-    [
-        pytest.param(2000, marks=pytest.mark.ci),
-        *(pytest.param(size, marks=pytest.mark.weekly) for size in (1300, 1380, 1450, 1600, 2600)),
-    ],
-)
+@pytest.mark.weekly
+@pytest.mark.parametrize("size", [1300, 1380, 1450, 1600, 2000, 2600])
 def test_with_some_more_memory_it_runs_or_says_so(tmp_path, size):
     """Around what it takes: no wait, no abort of a library, whatever was begun when it ran out."""
     path = write(tmp_path, HEAD, SMALL)
@@ -132,6 +128,7 @@ def test_with_some_more_memory_it_runs_or_says_so(tmp_path, size):
     assert "Traceback" not in told.stderr
 
 
+@pytest.mark.weekly
 def test_few_threads_of_others_read_a_folder(done):
     """Those of pyarrow wait for ever where no memory is left to begin more."""
     script = (

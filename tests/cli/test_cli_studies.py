@@ -233,6 +233,7 @@ def test_processes_give_the_same_rows(folder):
 REPORTS = ROOT / "reports"
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(REPORTS.glob("*.toml")), ids=lambda p: p.stem)
 def test_the_committed_studies_are_valid(path):

@@ -99,6 +99,7 @@ def make():
 '''
 
 
+@pytest.mark.weekly
 def test_an_engineer_has_a_page_of_a_loop_of_python_controls(tmp_path):
     """J w' = u - B w with u = e + integral of e: s^2 + 2.2 s + 2, so that -1.1 is the real part."""
     (tmp_path / "drive.py").write_text(ENGINEER, encoding="utf-8")
@@ -143,6 +144,7 @@ print("done")
 """
 
 
+@pytest.mark.weekly
 def test_a_veteran_finds_python_controls_habits(tmp_path):
     """Positional lists, short names, arrays of states, labels of states, describing functions."""
     script = tmp_path / "veteran.py"

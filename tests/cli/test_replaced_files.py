@@ -40,6 +40,7 @@ def in_the_way(folder, tmp_path, command, file, content):
     return command, path
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("command", "file", "content"),
     [
@@ -71,6 +72,7 @@ def test_what_others_have_made_stays(folder, tmp_path, command, file, content):
     assert after == before
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("command", "file"),
     [
@@ -89,6 +91,7 @@ def test_force_goes_on(folder, tmp_path, command, file):
     assert again.returncode == 0, again
 
 
+@pytest.mark.weekly
 def test_a_gallery_does_not_replace_the_page_of_a_report(folder, tmp_path):
     """The paper's report has the runs of its studies below it."""
     for out in ("paper", "paper/study"):

@@ -25,6 +25,7 @@ def inside(times):
     return times[(times > 0) & (times < END)]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 @pytest.mark.parametrize(
     ("how", "arrival"),
@@ -48,6 +49,7 @@ def test_jumps_are_breaks_where_they_leave(how, arrival, engine):
     assert lowest(run.time, y, breaks) == pytest.approx(-1.0, abs=1e-12)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 def test_kinks_of_delays_and_jumps_before_the_run_are_breaks(engine):
     varying = loop(delay=0.5, varying=lambda t: 0.3 * abs(t - 2.3))
@@ -59,6 +61,7 @@ def test_kinks_of_delays_and_jumps_before_the_run_are_breaks(engine):
         assert np.abs(run.jump_times - (sent + 0.5) / 0.9).min() < 1e-9
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 def test_jumps_leave_one_delay_behind_another(engine):
     one = nlctl.TransportDelay(outputs=("m",), delay=0.2, varying=lambda t: 0.3 * t)

@@ -61,6 +61,7 @@ def jumping_sine(w):
     return np.sin(3.0 * w) + (1.0 if np.sin(w) > 0.5 else 0.0)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("delays", [(LATE,), (0.5, LATE - 0.5)], ids=["one", "two"])
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_every_jump_of_a_saw_arrives_at_a_stop(rtol, delays):
@@ -84,6 +85,7 @@ def late_play(signal):
     return np.interp(PLACES, dense, through_play(late, R))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", TOLERANCES)
 @pytest.mark.parametrize("signal", [staircase, jumping_sine])
 def test_a_play_behind_a_delay_is_that_of_the_late_signal(signal, rtol):
@@ -129,6 +131,7 @@ def test_nothing_turns_at_seams_of_what_a_delay_keeps(memory_first):
         assert run.outputs == pytest.approx(runs[0].outputs, abs=30 * rtol)
 
 
+@pytest.mark.weekly
 def test_a_loop_with_a_play_and_a_delay_is_the_reference():
     """Where python-control's own right-hand side is integrated."""
     loop = delayed_loop(memory_first=False).system

@@ -30,6 +30,7 @@ def pantograph(t, a, q):
     return sum(a**k * q ** (k * (k - 1) / 2) * np.power(t, k) / factorial(k) for k in range(40))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("a", "q"), [(-1.0, 0.5), (0.4, 0.8)])
 def test_the_pantograph_equation_is_its_power_series(engine, a, q):
@@ -60,6 +61,7 @@ def forced():
     return nlctl.interconnect({"plant": plant, "wire": wire}, outputs=["x", "late"])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_delay_that_sways(engine):
     times = np.linspace(0, 20, 81)
@@ -89,6 +91,7 @@ def steps_by_hand(end, slope):
     return begins, parts
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("slope", [0.25, -0.5])
 def test_breaks_arrive_when_what_broke_does(engine, slope):

@@ -485,6 +485,7 @@ def test_drawing_in_threads_changes_nothing():
     assert {len(figure.axes[0].texts) for figure in figures} == {len(figures[0].axes[0].texts)}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_nothing_is_clipped_and_all_is_legible(name):
     """Text of at least 8 points, all of it on a page 9 inches wide; boxes hold their names."""

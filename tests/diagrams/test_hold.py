@@ -16,6 +16,7 @@ ENGINES = [
 ]  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", ENGINES, ids=str)
 def test_it_is_the_sampled_system(how):
     """At the samples exactly what `ct.sample_system` computes by matrix exponentials."""

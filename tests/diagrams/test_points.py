@@ -5,6 +5,7 @@ import contextlib
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -43,7 +44,7 @@ def parameters_now(system):
 
 
 @given(st.lists(st.floats(-10, 10), min_size=3, max_size=3), st.floats(0.1, 5), st.floats(0.1, 5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=many(20, part=4), deadline=None)
 def test_the_values_are_the_closed_form(values, k, gain):
     x, u = np.array(values[:2]), np.array(values[2:])
     rates, outputs = rates_and_outputs(pendulum(), {"plant.k": k, "gain.k": gain})(0.3, x, u)
@@ -77,7 +78,7 @@ def test_rounding_is_no_difference_and_more_is():
 
 
 @given(st.integers(1, 9), st.integers(0, 9), st.data())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=many(30, part=4), deadline=None)
 def test_any_two_numbers_are_moved_apart_once_and_all_alike_once(n, m, data):
     x, u = np.ones(n), np.ones(m)
     moved = [np.r_[x, u] for _, x, u in rounded_points((0.0, x, u), 1e-9)]
@@ -108,6 +109,7 @@ def test_points_past_the_end_of_a_function_are_left_out():
     assert far[0] > 0
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("enter", [
     lambda loop: overridden(loop, {"plant.k": 9.0, "gain.k": 9.0}),
     lambda loop: rates_and_outputs(loop, {"plant.k": 9.0})(0.0, np.zeros(2), np.zeros(1)),

@@ -5,6 +5,7 @@ import graphlib
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -59,7 +60,7 @@ def has_loop(follows):
     return False
 
 
-@settings(max_examples=40)
+@settings(max_examples=many(40))
 @given(diagrams())
 def test_a_ring_of_blocks_is_an_algebraic_loop_where_its_signals_are(made):
     """Then it is refused; otherwise outputs are those that python-control finds."""

@@ -62,6 +62,7 @@ def test_figures_of_the_actuators_are_those_of_the_record(name):
         np.testing.assert_allclose(places(kept), places(today), atol=1e-3)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "drawn"),

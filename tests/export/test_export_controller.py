@@ -77,6 +77,7 @@ def case(request, tmp_path_factory):
     return controller, folder, written(folder, controller), inputs, outputs, times
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("optimised", ["-O0", "-O3"])
 def test_c_is_the_simulation_bit_by_bit(case, optimised):
@@ -93,6 +94,7 @@ def test_object_code_is_the_simulation_bit_by_bit(case):
     np.testing.assert_array_equal(run_here(folder, defined, "code.o", inputs, times), outputs)
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("kind", ["c", "object code"])
 def test_a_microcontroller_computes_the_simulation_bit_by_bit(case, kind):

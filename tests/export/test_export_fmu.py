@@ -64,6 +64,7 @@ def errors(path, kind, run, end, **more):
     ]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ["bouncing ball", "sampled PID", "backlash", "kicked", "relay"])
 def test_fmpy_moves_it_as_nlctl_does(written, name):
     path, diagram, start, end = written(name)
@@ -72,6 +73,7 @@ def test_fmpy_moves_it_as_nlctl_does(written, name):
         assert max(errors(path, kind, run, end)) < 1e-8, kind
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", MODELS)

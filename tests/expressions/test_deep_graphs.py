@@ -132,6 +132,7 @@ def chains():
     return divided, added, multiplied
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("update", chains())
 def test_a_long_chain_is_run(update):
     """Whatever follows its parts does not call itself for each."""
@@ -147,6 +148,7 @@ def alternating(t, x, u, params):
     return [-x[0] + 1e-6 * y]
 
 
+@pytest.mark.weekly
 def test_taylors_method_follows_a_long_chain():
     """Its coefficients are made parts first."""
     native, reference = run(alternating, method="taylor")

@@ -50,6 +50,7 @@ def points_of(name):
     return st.lists(number, min_size=2, max_size=2, unique_by=lambda v: round(abs(v), 1))
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROWS)
 @given(data=st.data())
@@ -67,6 +68,7 @@ def test_each_partial_derivative_of_the_table(name, data):
         assert derivative(*x) == pytest.approx(wanted, rel=1e-8, abs=1e-8)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in ROWS if FUNCTIONS[name].enclosure])
 @given(data=st.data())

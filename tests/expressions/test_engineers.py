@@ -11,6 +11,7 @@ import nlctl
 NAMED = {entry.name: entry for entry in ENTRIES}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", sorted(NAMED))
 def test_a_function_becomes_expressions_with_python_controls_values(name):
     """At points with ties, zeros and NaN, too; where Python raises an error there is NaN."""

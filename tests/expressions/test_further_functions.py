@@ -151,6 +151,7 @@ def points():
     return rng.normal(size=(240, 4)) * np.resize([0.1, 0.5, 1.0, 3.0, 10.0], (240, 1))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 @pytest.mark.filterwarnings("ignore")
 def test_a_function_is_traced_with_pythons_values(name):

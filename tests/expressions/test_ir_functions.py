@@ -136,6 +136,7 @@ def ulps(got, x, name):
     return worst
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(EXACT))
 def test_errors_are_at_most_an_ulp_or_two(name):
@@ -148,6 +149,7 @@ def test_errors_are_at_most_an_ulp_or_two(name):
 ANGLES = ["sin", "cos", "sin of both", "cos of both"]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ANGLES)
 def test_multiples_of_half_pi_lose_nothing(name):
     """The floats nearest to multiples of pi / 2, where nearly all of the argument cancels."""
@@ -186,6 +188,7 @@ def test_limits():
         np.testing.assert_array_equal(values(name, tiny), tiny)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", sorted(EXACT))
 def test_one_number_is_computed_as_many_are(name):
     """Alone, two, four or eight side by side, called or written out: the same bits."""

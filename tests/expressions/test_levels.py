@@ -60,6 +60,7 @@ def test_narrow_windows_are_passed_on_the_way_up_and_down(name, method, rtol):
     assert abs(run.outputs[0, -1] - 2.0 * width) < 1e-2 * width + rtol
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", WINDOWS)
 def test_the_reference_sees_narrow_windows_as_well(name):
     holds, (low, high) = WINDOWS[name]
@@ -137,6 +138,7 @@ FAR = {
 }  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 @pytest.mark.parametrize("name", FAR)
 def test_runs_end_at_narrow_event_functions(name, engine):

@@ -185,6 +185,7 @@ CURVES = [
 ]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("curve", CURVES, ids=lambda c: type(c).__name__)
 def test_curves_of_scipy(curve):
     """Between their knots, at them, and beyond both ends."""
@@ -203,6 +204,7 @@ def test_a_grid_of_scipy(fill):
 SEQUENCES = ("xyz", "zyx", "XYZ", "ZYX", "zxz", "ZXZ", "YXY", "xzx")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("seq", SEQUENCES)
 def test_rotations(seq):
     """Made of quaternions, vectors and angles, and read as each of these, also at gimbal lock."""

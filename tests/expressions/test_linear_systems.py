@@ -271,6 +271,7 @@ def of_six_angles(x):
     return solution[0], solution[6], np.linalg.det(matrix)
 
 
+@pytest.mark.weekly
 def test_enclosures_hold_every_sample():
     """Elimination is written out for them; where a box is small its pivots are certain."""
     _, exprs = expressions_of(of_six_angles, 2)

@@ -52,6 +52,7 @@ def _tables(n):
     }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("name", "n"), [(name, 600) for name in _tables(4)] + [("interp", 200), ("a list", 200)]
 )
@@ -131,6 +132,7 @@ def test_what_a_list_holds_is_followed_whatever_it_is():
             np.testing.assert_allclose(compiled.dynamics(t, [x], []), expected, rtol=1e-14)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
 def test_each_place_that_a_state_passes_is_an_event(method):
     """A value for each interval of 400 unequal ones, there and back: their sums."""
@@ -158,6 +160,7 @@ def test_each_place_that_a_state_passes_is_an_event(method):
     np.testing.assert_allclose(run.states[3, 1], inner + outer, rtol=0, atol=1e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("n", [2, 6, 300])
 def test_a_table_may_be_of_parameters(n):
     """Places and values that a run may have otherwise: of the time, and of a state."""

@@ -39,6 +39,7 @@ FUNCTIONS = {
 }  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_matrices_are_those_of_numpy(name):
     function = FUNCTIONS[name]

@@ -40,6 +40,7 @@ BEYOND = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", BEYOND)
 def test_where_a_loop_takes_more_passes_than_are_written_out_its_function_is_called(name):
     """In single runs and in members, in continuous and in discrete time; and it is said."""
@@ -77,6 +78,7 @@ def quick_or_slow(t, x, u, params):
     return [y]
 
 
+@pytest.mark.weekly
 def test_only_members_that_take_more_passes_call_the_function():
     """The others stay what they are alone."""
     timepts, compiled = np.linspace(0.0, 0.5, 3), nlctl.compile(loop(quick_or_slow))
@@ -206,6 +208,7 @@ def counted_loop(n):
     )  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("here", "there"), [(10, 200), (200, 10)])
 def test_whether_passes_suffice_is_asked_of_the_integers_of_the_call(here, there):
     """All passes of 10 are written out, of 200 not; derivatives by differences of the function."""
@@ -306,6 +309,7 @@ def where_signs_differ(t, x, u, params):
     return [-c]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "update",
     [

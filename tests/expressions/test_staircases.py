@@ -151,6 +151,7 @@ SEARCHES = [halved_steps, signed_steps, copied_signs, bits, arrays_of_brackets, 
             patterns, parameter_sought]  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("update", SEARCHES)
 def test_a_staircase_is_called_and_has_the_slope_of_differences(update):
     compiled = nlctl.compile(block(update))
@@ -161,6 +162,7 @@ def test_a_staircase_is_called_and_has_the_slope_of_differences(update):
     np.testing.assert_allclose(matrix, slope(0.9), rtol=1e-2)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("update", [secants, newton, damped, clipped_fixed_point])
 def test_chains_of_answers_that_hardly_matter_are_expressions(update):
     compiled = nlctl.compile(block(update))

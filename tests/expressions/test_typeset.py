@@ -202,6 +202,7 @@ def test_users_functions_read_back():
     assert formulas > 600
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("example", [nlctl.paper.example_1, nlctl.paper.example_2])
 @pytest.mark.parametrize("values_shown", [False, True])
 def test_both_examples_are_shown_as_formulas(example, values_shown):

@@ -110,6 +110,7 @@ def _compared(function, states, points):
             np.testing.assert_allclose(computed, expected, rtol=1e-12, atol=1e-13, err_msg=f"{x}")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ONE)
 @pytest.mark.filterwarnings("ignore")
 def test_numbers_at_the_ends(name):
@@ -117,6 +118,7 @@ def test_numbers_at_the_ends(name):
     _compared(lambda x: function(x[0], x[1]), 2, [(a, b) for a in PLACES for b in PLACES[:9]])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ROWS)
 @pytest.mark.filterwarnings("ignore")
 def test_rows(name):

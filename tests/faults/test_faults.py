@@ -8,6 +8,7 @@ import cloudpickle
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rows import each_row
@@ -95,6 +96,7 @@ def faulty(kind, t, onset=AT):
     return np.where((t >= onset) & (t < end), formula(t), healthy(t))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_in_front_of_a_lag(kind):
     """The faulty signal at the samples, and y(end) to the tolerance, by machine code."""
@@ -105,6 +107,7 @@ def test_each_kind_in_front_of_a_lag(kind):
     assert made.statistics.events <= 2
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_in_python_control(kind):
@@ -119,6 +122,7 @@ def test_each_kind_in_python_control(kind):
 EXAMPLES = {"example-1": nlctl.paper.example_1, "example-2": nlctl.paper.example_2}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("example", EXAMPLES)
 @pytest.mark.parametrize("signal", ["actuator.v", "plant.x1", "controller.x1", "controller.law.u"])
 def test_a_fault_that_does_not_begin_changes_no_bit(example, signal):
@@ -231,7 +235,7 @@ class TestOnsets:
             np.testing.assert_allclose(s[far], signal(TIMES)[far], atol=1e-8)
 
     @given(some.integers(0, 10_000), some.floats(0.1, 10.0))
-    @settings(max_examples=20)
+    @settings(max_examples=many(20, part=4))
     def test_a_random_onset_follows_from_its_seed(self, seed, mean):
         """The same each time, and proportional to the mean; other seeds give others."""
         one = nlctl.Fault("a", "bias", 1.0, mean_time=mean, seed=seed)
@@ -248,6 +252,7 @@ class TestOnsets:
 class TestConditions:
     """A condition latches: the fault stays when it is no longer met."""
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @each_row(
         "when, begins",
@@ -380,6 +385,7 @@ class TestDelay:
         source = ct.nlsys(None, rising, inputs=0, outputs=["u"], name="source")
         return nlctl.interconnect({"source": source, "a": nlctl.Gain()}, outputs=["v"])
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("engine", ["native", "python-control"])
     @pytest.mark.parametrize("signal", ["source.u", "a.u"])
     def test_it_is_the_signal_of_before_while_it_lasts(self, signal, engine):

@@ -26,6 +26,7 @@ def loop(onset, until, kind="gain", value=GAIN, **more):
     return nlctl.with_faults(diagram, fault)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
 @pytest.mark.parametrize(
     "choice", [*({"method": m} for m in ("tsit5", "rodas5p", "taylor", "auto"))], ids=str

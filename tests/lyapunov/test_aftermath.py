@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -40,7 +41,7 @@ def crossed(N, kG, a, r0, zeta):
     return run.y
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=many(15, part=2), deadline=None)
 @given(
     st.floats(0.5, 3.0), st.floats(0.0, 0.9), st.floats(0.1, 60.0), st.floats(0, 6),
     st.floats(-1.0, 1.0), st.floats(0.2, 2.0),

@@ -351,6 +351,7 @@ def test_a_matrix_that_floats_take_for_definite_is_refused(P):
         region_of_attraction(lambda x: (-x[0], -x[1]), square_box(2, 1.0), P=P)
 
 
+@pytest.mark.weekly
 def test_a_point_on_the_way_is_named_as_what_is_missing():
     """No barrier is between a start and a point that it comes to."""
     start, unsafe = Box.of(x1=(2, 2), x2=(0, 0)), Box.of(x1=(1, 1), x2=(0, 0))
@@ -386,6 +387,7 @@ def test_a_refuted_level_has_a_point_where_v_does_not_fall():
             assert "V' >= 0" not in found.reason
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("lost", [
     lambda x: np.sqrt(np.abs(x[0]) - 0.05), lambda x: 0.01 * x[0] / (x[0] - 0.1) ** 2,
 ])  # fmt: skip

@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 import pytest
-from examples import some
+from examples import many, some
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -65,7 +65,7 @@ def least_by_hand(p, gains, reach):
     return brentq(excess, 0.0, 1e9) if excess(1e9) < 0 else np.inf
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=many(12, part=2), deadline=None)
 @given(st.floats(0.05, 1.2))
 def test_a_box_that_closes_is_the_least_fixed_point(p):
     """Against the scalar equation that is left without a network; the room is that of the proof."""
@@ -79,7 +79,8 @@ def test_a_box_that_closes_is_the_least_fixed_point(p):
     assert all(b <= a for a, b in zip(closure.box, reach(closure.C_0), strict=True))
 
 
-@settings(max_examples=12, deadline=None)
+@pytest.mark.weekly
+@settings(max_examples=many(12, part=2), deadline=None)
 @given(st.floats(1.31, 40.0))
 def test_where_the_map_grows_faster_than_the_box_none_closes(p):
     """Beyond p = lambda / sqrt(sigma_2/alpha_1 + 1/gamma) there is no fixed point."""
@@ -103,6 +104,7 @@ def published(number):
     return loop, *found_on(loop, start, sides, (-12.0, 6.0), W=np.zeros(27)), sides
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2])
 def test_with_the_published_gains_none_closes_whatever_the_weights(number):
@@ -136,7 +138,7 @@ def test_no_weights_have_less_than_the_least_bound(number):
             assert given_W >= 0.9 * own.C_0() or factor != 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_a_set_that_closes_on_another_box_is_not_called_false():
     """Example 1 with gains that close, whatever box it was examined on."""
     controller = nlctl.adaptive_neural(

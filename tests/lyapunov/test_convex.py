@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -29,7 +30,7 @@ def test_the_vector_of_a_matrix_has_its_inner_product(a, b):
 
 
 @given(NUMBERS)
-@settings(max_examples=20)
+@settings(max_examples=many(20, part=4))
 def test_the_least_trace_above_a_matrix_is_the_sum_of_its_positive_eigenvalues(numbers):
     """Of X >= M and X >= 0 it is that of the positive part of M."""
     M, basis = symmetric(numbers), symmetric_basis(3)
@@ -42,7 +43,7 @@ def test_the_least_trace_above_a_matrix_is_the_sum_of_its_positive_eigenvalues(n
 
 
 @given(st.lists(st.floats(-3, 3), min_size=2, max_size=2))
-@settings(max_examples=20)
+@settings(max_examples=many(20, part=4))
 def test_the_nearest_point_of_a_quadrant_is_cut_off_at_its_edges(point):
     """min |x - p|^2 over x <= 1; a gap of 1e-8 of the cost is 1e-4 of x."""
     p = np.array(point)

@@ -33,6 +33,7 @@ FUNCTIONS = {
 ENDS = st.floats(-4, 4)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", FUNCTIONS)
 @given(ends=st.lists(ENDS, min_size=4, max_size=4), seed=st.integers(0, 10**6))
 def test_a_box_holds_what_points_give(name, ends, seed):
@@ -84,6 +85,7 @@ def test_roots_of_what_is_not_negative_are_finite_around_zero(root, inner, a, b,
     assert found.low - 1e-9 <= function(x) <= found.high + 1e-9 * (1 + function(x))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("root", ROOTS)
 @given(low=st.floats(1e-12, 4), high=st.floats(0, 4))
 @settings(max_examples=many(10, part=2))

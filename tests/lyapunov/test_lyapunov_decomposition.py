@@ -74,6 +74,7 @@ WIDE = SmoothLimit(limit=1e4)  # over |u| <= 30 a gain close to 1
 split = functools.cache(decompose)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BOUNDS)
 @given(u=st.floats(-60, 60, allow_subnormal=False))
@@ -91,6 +92,7 @@ def test_the_textbook_split_has_the_closed_form_bounds():
     assert found.eps_u(at_crest, output(ZONE, at_crest)) == pytest.approx(-0.65)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("k_1", [0.6, 0.3, 0.1])
 def test_a_smaller_gain_buys_a_smaller_error(k_1):

@@ -86,6 +86,7 @@ def margins(signals, number=1):
     return {m.equation: m for m in inequalities(signals, premises(found(number)))}
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2])
 def test_the_steps_of_the_proof_agree_to_rounding(number):
@@ -164,6 +165,7 @@ class WrongNussbaumLaw(nlctl.controllers.NussbaumLaw):
         return (-u[0] * (p.beta * u[0] + u[1] + u[2] + u[3]),)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("pieces", "broken"),
     [
@@ -230,6 +232,7 @@ FORCINGS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("change", FORCINGS, ids=list(FORCINGS))
 def test_a_proof_with_the_forcing_in_g_holds_with_the_eps_of_that_g(change):

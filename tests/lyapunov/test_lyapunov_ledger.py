@@ -93,6 +93,7 @@ class FaultyPlant(nlctl.PureFeedback):
         return x2, rate
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("fault", range(5))
 def test_a_plant_of_many_cases_is_observed(fault):
     """Its rates are outputs next to its other cases; no loop of signals without a state appears."""
@@ -107,6 +108,7 @@ def test_a_plant_of_many_cases_is_observed(fault):
         assert rate == pytest.approx([plain, plain + 1, 2 * plain, plain - x1, plain / 2][fault])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("number", [1, 2])
 def test_the_examples_hold_as_corrected(number):
     """No corrected statement is violated; of the paper's own, Lemma 1 and the closed set are."""
@@ -217,6 +219,7 @@ def test_the_ledger_prints_tabulates_and_is_json():
 
 
 class TestFaults:
+    @pytest.mark.parted
     @pytest.mark.parametrize(
         ("member", "broken"),
         [
@@ -303,6 +306,7 @@ def test_without_a_box_it_is_what_the_run_visits():
     assert not found.violated
 
 
+@pytest.mark.weekly
 def test_a_long_run_tells_where_the_slow_drift_leads():
     """Example 2 spends its budget slowly: some percent, and a time long after the run."""
     found = ledger(example(2), 320.0, box=BOXES[2], W=np.zeros(27), step=0.04)

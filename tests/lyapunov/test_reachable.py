@@ -65,6 +65,7 @@ def integrated(function, x, t, substeps):
         yield x
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("function", "box", "horizon"),
     [
@@ -124,6 +125,7 @@ def test_a_point_on_a_circle_reaches_its_radius_and_no_more():
     assert less.refuted == {"x1": 1.0, "x2": 0.0}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
 def test_a_planted_violation_is_never_proved(share):
     """From radii up to 1.1, x1 > share + (1 - share) 1.1 is met by some solution, if by few."""

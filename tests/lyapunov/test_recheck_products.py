@@ -29,6 +29,7 @@ def made(function):
     return WrittenEquation(operations(NAMES, lambda s: function(s["x"], s["y"])))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", FUNCTIONS)
 @given(x=NUMBERS, y=NUMBERS)
 def test_it_has_the_value_of_the_equation(name, x, y):
@@ -68,6 +69,7 @@ def test_what_is_equal_cancels_and_nothing_else(name):
     assert (plus(one, other, Fraction(-1)) == {}) == (name in SAME)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "nodes",
     [

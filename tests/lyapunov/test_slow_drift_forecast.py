@@ -83,7 +83,7 @@ def late_example_2(compiled, rng):
     return None
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_scalar_loops():
     """A few loops whose balance is exact, every day."""
     rng = np.random.default_rng(0)

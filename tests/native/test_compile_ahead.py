@@ -52,6 +52,7 @@ def sampled():
     return ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("ensemble", [False, True])
 @pytest.mark.parametrize(
     ("make", "functions", "varied"),

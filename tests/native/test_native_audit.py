@@ -103,6 +103,7 @@ DEFECTS = [swapped_operator, swapped_choice, slice_off_by_one, sum_without_its_l
            state_for_a_parameter]  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("defect", DEFECTS, ids=lambda defect: defect.__name__)
 def test_a_planted_defect_is_found(defect, monkeypatch):
@@ -198,6 +199,7 @@ CANCELLING = {  # how long (s), and the rate
 }
 
 
+@pytest.mark.parted
 @pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="many steps without JIT")
 @pytest.mark.parametrize("kind", CANCELLING)
 def test_rounding_is_no_difference(kind):

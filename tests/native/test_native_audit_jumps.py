@@ -98,6 +98,7 @@ DEFECTS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("defect", DEFECTS)
 def test_a_planted_defect_is_found(defect, monkeypatch):
     """The rates and outputs are right, and what is located or jumps is not."""

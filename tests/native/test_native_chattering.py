@@ -53,6 +53,7 @@ def run(system, start, **given):
     )
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("loop", "exact"),
     [(sign_loop(), 2.0), (relay_loop(), (np.sqrt(3) - 1) / 2), (fuller_loop(), fuller_end())],
@@ -121,6 +122,7 @@ WELL = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", WELL)
 def test_what_only_looks_like_it_ends_well(name):
     assert run(*WELL[name]).statistics.status is Status.OK
@@ -218,6 +220,7 @@ def hand_friction(t, x, u, p):
     return u[0] - np.sign(x)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("drive", ["constant", "ramp", "sine"])
 @pytest.mark.parametrize(("rtol", "atol"), [(1e-8, 1e-10), (1e-6, 1e-8)])
 def test_chattering_is_found_between_dense_samples(drive, rtol, atol):
@@ -280,6 +283,7 @@ def oscillation(actuator):
     return nlctl.interconnect({"relay": actuator, "plant": plant}), {"plant.x[0]": 1.0}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("width", [1e-1, 1e-2, 1e-3])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 @pytest.mark.parametrize(

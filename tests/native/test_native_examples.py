@@ -206,6 +206,7 @@ def test_the_examples_of_the_textbook_agree_at_random_points(name, native):
     compare(EXAMPLES[name](), native=native)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_responses_agree_with_python_control(name):

@@ -58,6 +58,7 @@ def test_a_spawned_process_computes_the_same_bits():
             np.testing.assert_array_equal(futures[name].result(timeout=120), here)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
 @pytest.mark.parametrize("name", CASES)
 def test_a_copy_is_complete_and_independent(name, duplicate):

@@ -258,6 +258,7 @@ class TestCache:
         assert compilations == 0
         assert second - first == pytest.approx(1.5)  # one unit of slope at u - b_r = 1.5
 
+    @pytest.mark.weekly
     @pytest.mark.ci
     def test_an_unwritable_cache_costs_time_only(self, tmp_path):
         """A file in the place of the folder: the program still runs."""

@@ -76,6 +76,7 @@ needs_jit = pytest.mark.skipif(
 )
 
 
+@pytest.mark.parted
 @needs_jit
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.filterwarnings("ignore::nlctl.errors.EngineWarning")
@@ -87,6 +88,7 @@ def test_what_cancels_is_no_difference(name):
         assert np.isfinite(run.states).all()
 
 
+@pytest.mark.parted
 @needs_jit
 @pytest.mark.parametrize(
     "name",

@@ -57,6 +57,7 @@ def test_a_relay_behind_a_lag_comes_to_rest(T, method, rtol):
     assert np.abs(of_plant(made)[:, -1]).max() <= 1e-6
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("K", "rest_rate"), [(1.0, 4e-3), (2.0, 1e-3), (0.5, 1e-3), (10.0, 1e-3)])
 def test_it_switches_until_the_rate_is_that_of_rest(K, rest_rate):
     """J / A^2 = +-1 / K: from passage to passage 1 / |z| grows by 2 / (3 K), to 1 / rest_rate."""
@@ -166,6 +167,7 @@ def test_without_a_rate_of_rest_it_ends_with_the_reason_and_the_time():
     assert run(system, times=[0.0, 1.0]).statistics.status is Status.OK
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
 @pytest.mark.parametrize(("damping", "offset"), [(20.0, 0.0), (8.0, 0.4)])
 def test_a_sign_behind_a_lag_ends_with_the_reason(method, damping, offset):

@@ -60,6 +60,7 @@ class StepAt:
         return (t - p.time,)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
 @pytest.mark.parametrize("c", [-0.9, 0.0, 0.5])
 def test_what_comes_to_the_jump_stays_with_the_output_that_holds_it(c, method):
@@ -136,6 +137,7 @@ def test_it_converges_with_the_order_of_the_method_where_it_slides():
     assert np.all(errors < 0.01 * steps**5)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_hysteresis_converges_to_it_with_its_width(seed):
@@ -159,6 +161,7 @@ def test_a_hysteresis_converges_to_it_with_its_width(seed):
     assert apart[1] < apart[0] / 4
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_what_holds_of_every_relay(order):
@@ -375,6 +378,7 @@ class TestInputsOfTheDiagram:
         exact = np.clip(1.5 * (TIMES - 4), 0, 2.3)
         np.testing.assert_allclose(of_plant(made)[0], exact, rtol=0, atol=1e-6)
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(6))
     def test_a_hysteresis_converges_to_it(self, seed):
@@ -449,6 +453,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_faults_of_its_signals_are_those_of_a_narrow_hysteresis(fault):

@@ -95,6 +95,7 @@ def test_it_comes_from_a_side_with_the_rate_of_the_saturation():
     np.testing.assert_allclose(u, np.where(end > TIMES, reaching(TIMES), 0), rtol=0, atol=1e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("seed", range(6))
 def test_random_bends_against_a_root_search(seed):
     """Sums of saturations of either sign before v, in a row with another; signs by parameters."""

@@ -153,6 +153,7 @@ class TestEntries:
         store.write("key", BODY)
         assert store.read("key") == BODY
 
+    @pytest.mark.weekly
     @pytest.mark.ci
     def test_two_processes_may_write_at_the_same_time(self, folder):
         """Whoever reads finds a whole entry."""
@@ -482,6 +483,7 @@ class TestKeys:
         one, other = namedtuple("Point", "a b")(1.0, 2.0), namedtuple("Point", "b a")(1.0, 2.0)
         assert function_key(one) != function_key(other)
 
+    @pytest.mark.weekly
     @pytest.mark.ci
     def test_a_key_is_the_same_in_every_process(self):
         """Whatever the order of sets and the addresses of objects there are."""
@@ -587,7 +589,7 @@ class TestSources:
             nlctl.compile(system).native  # noqa: B018
         assert (module_key(*TEACHERS), integrator_key()) == before
 
-    @pytest.mark.slow
+    @pytest.mark.weekly
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"

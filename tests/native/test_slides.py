@@ -44,6 +44,7 @@ def by_heaviside(t, x, u, params):
     return 1.0 - 2.0 * np.heaviside(x - 0.5, 0.5)
 
 
+@pytest.mark.parted
 @methods
 @pytest.mark.parametrize(
     "update",
@@ -67,6 +68,7 @@ def test_without_sliding_it_ends_with_the_reason():
     assert ended.value.time == pytest.approx(0.5, abs=1e-6)
 
 
+@pytest.mark.parted
 @methods
 def test_dry_friction_holds_until_it_is_overcome(method):
     """v' = t / 10 - sign(v) from 1: rests after 10 - sqrt(80) s, and breaks away after 10 s."""
@@ -185,6 +187,7 @@ def test_an_input_drives_it_along():
     assert run.outputs == pytest.approx(exact.y[0], abs=1e-6)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("seed", [1, 2, 7, 11])
 def test_linear_loops_with_a_sign_are_limits_of_smooth_ones(seed):
     """Signs over a width of 1e-6, by SciPy's stiff method."""
@@ -270,6 +273,7 @@ def rounded_down(z):
     return math.floor(z)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("steps", "first"),
     [

@@ -66,6 +66,7 @@ def test_a_quantiser_of_many_levels_in_a_loop(method):
     assert made.statistics.events >= int((np.exp(c * last) - 1) * c / q) - 1
 
 
+@pytest.mark.parted
 @METHODS
 def test_what_comes_back_to_one_place_still_chatters(method):
     """A staircase of one state next to a sign that slides at another, from t = 1 on."""

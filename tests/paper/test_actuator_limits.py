@@ -45,6 +45,7 @@ def test_it_has_no_actuator_that_is_gone():
     assert set(RECORD["actuator"]) <= set(actuators_of_the_table())
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "name"),

@@ -53,6 +53,7 @@ def test_the_averaged_loop_is_the_exact_one_while_v_sweeps_the_ripple():
     assert found["zeta"][-1] == pytest.approx(rows["zeta"][-1], abs=1e-3)
 
 
+@pytest.mark.weekly
 def test_the_burst_obeys_the_integral_of_n():
     """r^2/2 grows by k G int N, with the mean gain at the place of the burst; it ends where the
     integral is 0."""

@@ -121,7 +121,7 @@ def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
     assert result.signals["zeta"][-1] == pytest.approx(zeta, abs=tolerance)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_nlctl_call_and_plain_call_agree():
     """nlctl's reference engine and python-control's own call integrate one right-hand side."""
     diagram, timepts = CASE["1"].make(), np.linspace(0, 0.5, 11)

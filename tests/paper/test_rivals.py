@@ -68,7 +68,7 @@ def test_the_gains_reach_the_loop(example):
             assert (own[int(index[:-1])] if index else own) == value
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_each_actuator_has_the_same_controllers_on_the_same_samples():
     """The study files differ in the pairs alone."""
     for number, example in zip("12", EXAMPLES, strict=True):
@@ -90,7 +90,7 @@ def test_an_unknown_pair_is_refused(pair, told):
         rival_loop("example_1", pair)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
     """x' = u = -k x from x_0: IAE = |x_0| / k, max |u| = k |x_0|; so k = limit / max |x_0|."""
 
@@ -141,7 +141,7 @@ def checked():
     return checked_rivals()
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_the_record_is_of_the_study(example):
     """All controllers behind all actuators on the samples that the file asks for; the page too."""
@@ -154,6 +154,7 @@ def test_the_record_is_of_the_study(example):
     assert rivals_text(record, example) in PAGE.read_text(encoding="utf-8")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "column",
     ["study", *(pytest.param(one, marks=pytest.mark.ci) for one in ("parameters", "rates"))],

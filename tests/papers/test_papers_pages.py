@@ -129,6 +129,7 @@ def test_the_page_of_papers_has_a_row_for_each():
         assert paper.not_reproduced in row
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_the_command_writes_a_page(tmp_path):
     """Exit code 0, although a statement of others is refuted."""

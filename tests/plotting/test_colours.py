@@ -86,6 +86,7 @@ def test_figures_take_their_colours_from_here():
     assert own == {"#111111": "searches.py"}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("low", [-0.3, -0.0123, -12.5])
 def test_ticks_of_margins_do_not_run_into_each_other(low):
     """Numbers of any length, at the size of letters that a page has."""

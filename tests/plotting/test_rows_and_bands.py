@@ -4,6 +4,7 @@ import control as ct
 import matplotlib as mpl
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,7 +35,7 @@ signs = st.sampled_from([-1.0, 1.0])
 
 
 @given(a=signs, b=signs, c=st.floats(0.5, 2.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=many(20, part=4), deadline=None)
 def test_sums_and_differences_share_a_row(a, b, c):
     """e = +-y +-r, also where r is constant; what is another multiple does not."""
     y, r = np.sin(T), np.cos(3 * T)

@@ -28,10 +28,9 @@ def test_a_number_agrees_with_noun_and_verb(text, expected):
     assert text == expected
 
 
-def nouns():
+def nouns(calls):
     """The nouns that the modules count, in the plural."""
-    calls = (node for tree in MODULES.values() for node in ast.walk(tree))
-    for call in (node for node in calls if isinstance(node, ast.Call)):
+    for call in calls:
         words = [one.value for one in call.args if isinstance(one, ast.Constant)]
         match getattr(call.func, "id", ""), words:
             case "counted", [_, many]:
@@ -40,14 +39,12 @@ def nouns():
                 yield f"{one.split()[-1]}s"
 
 
-def counts(tree, plural):
+def counts(text, plural):
     """Yield line and value, where a text has a value before one of these words."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.JoinedStr):
-            for value, rest in itertools.pairwise(node.values):
-                is_of_value = isinstance(value, ast.FormattedValue)
-                if is_of_value and isinstance(rest, ast.Constant) and plural.match(rest.value):
-                    yield node.lineno, ast.unparse(value.value)
+    for value, rest in itertools.pairwise(text.values):
+        is_of_value = isinstance(value, ast.FormattedValue)
+        if is_of_value and isinstance(rest, ast.Constant) and plural.match(rest.value):
+            yield text.lineno, ast.unparse(value.value)
 
 
 SEVERAL = {  # never one: of a fixed size, or another text is written for one
@@ -68,11 +65,19 @@ NO_COUNT = re.compile(r"^_?[A-Z_]+$|shape|\.ratio$")  # a constant, "3 x 2 value
 
 def test_what_is_counted_is_counted_in_one_way():
     """No text writes a number before a plural that others count."""
-    plural = re.compile(rf" (?:{'|'.join(sorted(set(nouns())))})\b")
+    nodes = [
+        (name, node)
+        for name, tree in MODULES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call | ast.JoinedStr)
+    ]
+    counted_nouns = nouns(node for _, node in nodes if isinstance(node, ast.Call))
+    plural = re.compile(rf" (?:{'|'.join(sorted(set(counted_nouns)))})\b")
     found = {
         (name, value): line
-        for name, tree in MODULES.items()
-        for line, value in counts(tree, plural)
+        for name, text in nodes
+        if isinstance(text, ast.JoinedStr)
+        for line, value in counts(text, plural)
         if not NO_COUNT.search(value)
     }
     assert {place: line for place, line in found.items() if place not in SEVERAL} == {}

@@ -49,6 +49,7 @@ def test_a_script_has_its_own_analysis_next_to_nlctls(tmp_path):
     assert (said.stdout, said.stderr) == ("42 nlctl.analysis.metrics\n", "")
 
 
+@pytest.mark.weekly
 def test_the_command_line_hides_no_analysis_of_the_users(tmp_path):
     """The file with the loop imports its neighbour, whose answer is a time constant of 42 s.
 
@@ -109,6 +110,7 @@ def test_what_is_pickled_has_the_present_name():
         assert b"nlctl.analysis.metrics" in dumps(made)
 
 
+@pytest.mark.weekly
 @pytest.mark.skipif(len(SOURCES) == 1, reason="installed, and not run from a checkout")
 def test_a_checkout_has_its_own_analysis_whatever_is_installed(tmp_path):
     """PYTHONPATH names one of two checkouts: everything is of that one, in processes as well."""

@@ -31,6 +31,7 @@ def strictly_checked(folder, text):
     return [(d["range"]["start"]["line"] + 1, d["message"]) for d in found["generalDiagnostics"]]
 
 
+@pytest.mark.weekly
 def test_a_users_script_has_no_error_in_a_strict_editor(tmp_path):
     """No type is unknown, no call is wrong."""
     assert strictly_checked(tmp_path, (SUPPORT / "typed_user.py").read_text(encoding="utf-8")) == []

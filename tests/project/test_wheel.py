@@ -112,6 +112,7 @@ def fresh_environment(folder, *what):
     return python, places
 
 
+@pytest.mark.weekly
 def test_wheel_runs_in_a_fresh_environment(wheel, tmp_path):
     """The console script lists, simulates and draws from an empty folder; the former name warns."""
     empty = tmp_path / "empty"
@@ -130,6 +131,7 @@ def test_wheel_runs_in_a_fresh_environment(wheel, tmp_path):
     assert sorted(p.name for p in empty.iterdir()) == ["loop.svg", "out.csv"]
 
 
+@pytest.mark.weekly
 def test_an_editable_install_is_of_its_checkout(wheel, tmp_path):
     """`nlctl.analysis` is the folder at the top of the checkout, for the command as well."""
     source = wheel.parent / "source"

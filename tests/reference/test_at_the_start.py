@@ -25,6 +25,7 @@ def test_what_starts_at_a_threshold_leaves_it_by_the_rates_there(rtol):
     assert set(run.events["time"]) == {0.0}
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_rates_that_jump_by_more_than_a_step_can_be_short_for(rtol):
     """1e-10 s before the end rates become 1e6."""

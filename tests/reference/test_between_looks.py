@@ -41,6 +41,7 @@ WAVES = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "name", [pytest.param(k, marks=[pytest.mark.weekly] * (k in LONG)) for k in WAVES]
 )
@@ -145,6 +146,7 @@ def noisy(rate):
     return nlctl.interconnect({"quiet": quiet, "noisy": block}, outputs=["q", "n"])
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.parametrize(
     "rate",

@@ -78,6 +78,7 @@ def height(times, e, bounces):
     return found, start
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "method", ["LSODA", "DOP853", "Radau", "auto", "tsit5", "rodas5p", "taylor"]
 )
@@ -89,6 +90,7 @@ def test_twelve_bounces(method):
     np.testing.assert_allclose(found.outputs[0], height(times, 0.8, 12)[0], rtol=0, atol=1e-7)
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.slow
 @given(

@@ -212,6 +212,7 @@ def test_in_the_reference(pair):
     np.testing.assert_allclose(*outputs(pair, "python-control"), rtol=0, atol=1e-8)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("pair", PAIRS)
 def test_in_machine_code(pair):
     np.testing.assert_allclose(*outputs(pair, "native"), rtol=0, atol=1e-7)

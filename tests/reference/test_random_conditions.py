@@ -97,6 +97,7 @@ def check(seed, engines):
 MACHINE = [{"engine": "native", "method": method} for method in ("taylor", "rodas5p")]
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_methods_and_engines_agree(seed):

@@ -32,6 +32,7 @@ def diagram(*lags):
     return nlctl.interconnect(blocks, outputs=["u"])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("system", "block", "start", "engine"),
     [
@@ -67,6 +68,7 @@ def test_rates_that_lead_back_at_once_are_not_said_to_be_of_second_order(engine)
     assert "second-order" not in str(ended.value)
 
 
+@pytest.mark.weekly
 @engines
 def test_twisting_ends_near_the_time_of_its_last_switch(engine):
     """x'' = -3 sign(x) - sign(x'): half a turn takes 1.5 sqrt(|x|), and halves |x|."""
@@ -80,6 +82,7 @@ def test_twisting_ends_near_the_time_of_its_last_switch(engine):
     assert ended.value.time == pytest.approx(limit, abs=1e-3)
 
 
+@pytest.mark.parted
 @engines
 def test_a_sign_behind_two_lags_oscillates(engine):
     """1 / (s (1 + T s)^2) has the phase -pi at w = 1 / T: the period of describing functions."""
@@ -165,6 +168,7 @@ def test_a_run_slides_where_the_shortest_steps_are_lost_in_the_rounding_of_a_sta
     assert ended.value.time == pytest.approx(0.195423, abs=1e-5)
 
 
+@pytest.mark.parted
 @methods
 @pytest.mark.parametrize(
     ("rate", "start", "end", "slides"),

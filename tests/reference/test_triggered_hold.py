@@ -39,6 +39,7 @@ def samples(made):
     return rows["time"][(rows["block"] == "hold") & (rows["which"] == "guard 1")].to_numpy()
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.1, 0.3, 0.9])
@@ -138,6 +139,7 @@ def with_threshold(threshold):
     return nlctl.interconnect(blocks, outputs=["u1"])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", [{"engine": "python-control"}, {}, {"method": "taylor"}])
 def test_a_threshold_that_falls_to_0_has_no_end_of_samples(how):
     """t_k+1 - t_k = (1 - t_k+1) / 2: 1 - (2 / 3)^k, and none from t = 1 on."""

@@ -43,6 +43,7 @@ def test_the_table_of_events(engine):
     np.testing.assert_array_equal(made.time, TIMES)
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.parametrize(("direction", "kept"), [(1, [1]), (-1, [0, 2]), (0, [0, 1, 2])])
 def test_only_changes_of_one_direction_count(engine, direction, kept):
@@ -104,6 +105,7 @@ def test_nothing_that_is_watched_moves_the_result(engine):
     np.testing.assert_allclose(watched, run(engine).states[:, -1], rtol=0, atol=1e-8)
 
 
+@pytest.mark.parted
 @engines
 @pytest.mark.parametrize(
     ("function", "time"),

@@ -68,6 +68,7 @@ through_zero = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.parted
 @ways
 @through_zero
 def test_what_jumps_to_0_is_an_event_where_it_jumps_on(loop, inputs, function, time, how):
@@ -79,6 +80,7 @@ def test_what_jumps_to_0_is_an_event_where_it_jumps_on(loop, inputs, function, t
     assert rows["direction"].tolist() == ["rising"]
 
 
+@pytest.mark.parted
 @ways
 @through_zero
 def test_a_run_ends_where_its_function_jumps_on_from_0(loop, inputs, function, time, how):

@@ -74,6 +74,7 @@ def test_a_pulse_arrives_behind_a_delay_that_nothing_else_happens_in(name, begin
     assert made.outputs[-1] == pytest.approx(area, abs=30 * rtol)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("second", [2.7, 8.1])
 def test_a_pulse_arrives_behind_two_delays(second, run):
     parts = {"s": source(GAUSS), "l": late("v", "d", 3.3), "m": late("d", "e", second),

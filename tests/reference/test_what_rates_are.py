@@ -20,6 +20,7 @@ RATES = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", RATES)
 def test_the_reference_takes_what_python_control_takes(name):
     block = ct.nlsys(RATES[name], None, states=2, inputs=0, outputs=2, name="block")

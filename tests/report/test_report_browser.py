@@ -126,6 +126,7 @@ def visit(browser, pages):
         context.close()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", PAGES)
 def test_nothing_is_fetched_and_the_console_is_silent(visit, name):
     """Fonts and pictures are data inside the page, and the policy blocks nothing that is ours."""
@@ -142,6 +143,7 @@ SCHEMES = [
 ]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("name", "scheme"), SCHEMES)
 def test_axe_finds_no_violation(visit, name, scheme):
     """Contrast, names, roles, headings, keyboard, in both colour schemes."""
@@ -534,6 +536,7 @@ def test_pages_of_paper_are_numbered_and_unfolded(chromium, pages, tmp_path):
             assert sheet[head.end() :].count("pass") + sheet[head.end() :].count("fail") > 1
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ["paper", "compared", "gallery"])
 def test_no_page_of_paper_is_half_empty(chromium, pages, tmp_path, name):
     """But the last one: what does not fit below leaves less than half of a page."""

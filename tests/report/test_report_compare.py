@@ -161,6 +161,7 @@ def test_gallery_of_nothing_is_refused(tmp_path):
         write_gallery_of(tmp_path, open_=False)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", [n for n in HOSTILE if n != "path"])
 def test_gallery_shows_hostile_titles_as_text(tmp_path, name):
     """No element more than with plain ones."""

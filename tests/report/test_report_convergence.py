@@ -49,6 +49,7 @@ def drawn_bounds(figure, *, of_band):
     return heights.min(), heights.max()
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "answer"), KEYS)
 def test_what_is_said_to_decide_does(report, kind, answer):

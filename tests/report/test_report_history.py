@@ -127,6 +127,7 @@ def test_the_policy_allows_the_charts_by_hash_and_nothing_else():
     assert not [a for _, a in Reader(page).tags if "style" in a]
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_are_data_and_no_markup(name):
@@ -230,6 +231,7 @@ def test_a_study_has_a_history_of_its_nominal_and_its_worst_run():
     assert chart(history)["data"][2] == [1.0, 9.0, None, None, None]
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_the_command_writes_an_interactive_page_of_a_study(tmp_path, monkeypatch):
     """With ``--interactive`` only; the page says what makes it again."""

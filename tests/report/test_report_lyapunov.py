@@ -75,6 +75,7 @@ def rows_by_key(number):
     return shown
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("number", [1, 2])
 def test_every_line_of_the_ledger_is_shown_once_with_its_status(number):
     """Nothing is left out, and the status is that of the ledger."""
@@ -155,6 +156,7 @@ def test_commands_in_the_text_are_python():
         compile(command, "command", "exec")
 
 
+@pytest.mark.weekly
 def test_the_part_is_in_the_papers_report_when_there_is_evidence():
     """With it: sections, figures, valid page, the same numbers in JSON.  Without: as before."""
     report = paper_report(made_up_runs(), proofs=found())
@@ -239,6 +241,7 @@ def test_a_burst_feeds_on_the_integral_of_the_nussbaum_function():
     assert slope * G[0] < r[-1] ** 2 / 2 / (upper - lower) < 1.01 * slope * G[1]
 
 
+@pytest.mark.weekly
 def test_no_word_of_the_figures_is_hidden():
     """With the run of Example 2 that the page shows; nothing is cut off or lies on a curve."""
     record = read_record(dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2))
@@ -359,6 +362,7 @@ def test_the_kept_record_goes_on_where_a_run_of_today_ends():
         continued(other, record)
 
 
+@pytest.mark.weekly
 def test_a_record_is_of_two_tolerances_that_agree():
     """To 5 s; the report then says both times."""
     late = burst()
@@ -378,6 +382,7 @@ def carried():
     return through_the_burst(burst())
 
 
+@pytest.mark.weekly
 def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
     """The proof is refuted; that signals stay bounded is open, whatever the burst looks like."""
     run = read_record(long_run(nlctl.paper.example_2(), 210.0))
@@ -412,6 +417,7 @@ def test_the_theorem_is_a_claim_without_long_runs_too():
     assert "Far beyond" not in report.verdict
 
 
+@pytest.mark.weekly
 @each_row("key", ["1", "2", "1-backlash", "2-dead-zone"])
 def test_following_is_a_bound_of_the_error(key):
     """Not agreement with numbers of others: a case just beyond the bound fails, and is named."""

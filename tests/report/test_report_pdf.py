@@ -43,6 +43,7 @@ def page(tmp_path, monkeypatch):
     return installed
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("program", [WORKS, LEAVES_A_CHILD], ids=["works", "leaves a child"])
 def test_a_print_may_take_longer_than_the_patience(page, tmp_path, program):

@@ -334,6 +334,7 @@ def test_a_violation_that_is_not_confirmed_is_open(result):
     assert found["worst-case"] == found["sequential"] == ("not shown yet", "caution")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", ["Sobol'", "Latin hypercube", "corners"])
 def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     """Rows that are no independent draws give no statement about a probability."""
@@ -347,6 +348,7 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     assert "not an estimate of a probability" in section.items[0].text
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_an_analysis_without_an_answer_says_why(result):
     """Of whatever kind: its section and its claim have the reason, and the others are as ever.
@@ -387,6 +389,7 @@ def test_the_page_holds_the_study(result, report, page, tmp_path):
     assert report.inputs["study.toml"] in Reader(page).text
 
 
+@pytest.mark.weekly
 def test_no_word_of_the_figures_is_hidden(report):
     """Labels and legends are whole, and lie on no curve, no bar and no other label."""
     made = {i.key: i.figure for s in report.sections for i in s.items if isinstance(i, Figure)}
@@ -648,6 +651,7 @@ def test_labels_of_figures_are_short_and_can_be_drawn(name):
     assert not any(unicodedata.category(c).startswith("C") for c in label)
 
 
+@pytest.mark.weekly
 def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
     """From a study file, which is run first and taken up again, or from a folder, loop or not."""
     monkeypatch.chdir(tmp_path)

@@ -30,6 +30,7 @@ def loop(*lines):
     )
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("delay", [0.1, 0.3, 0.07, 0.25])
 def test_behind_a_sampled_block(delay):
     """What it holds arrives later: commensurate or not."""
@@ -37,6 +38,7 @@ def test_behind_a_sampled_block(delay):
     check(loop(direct, line("m", "u", delay)), loop(direct, program("m", "u", delay)))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("delay", [0.1, 0.3, 0.07, 0.25])
 def test_before_a_sampled_block(delay):
     """What it samples was sampled earlier."""

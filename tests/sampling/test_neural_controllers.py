@@ -20,6 +20,7 @@ def ainncs():
     return module
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ["cruise control", "TORA", "unicycle", "pendulum"])
 def test_machine_code_is_python_control(ainncs, name):
     """From one start, over the whole horizon, to tight tolerances."""
@@ -34,6 +35,7 @@ def test_machine_code_is_python_control(ainncs, name):
     np.testing.assert_allclose(one.outputs, other.outputs, rtol=1e-7, atol=1e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ["cruise control", "TORA", "unicycle", "pendulum"])
 def test_no_corner_of_the_box_violates(ainncs, name):
     """As published: verified there, the pendulum from the box of the later year."""

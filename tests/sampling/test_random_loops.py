@@ -124,6 +124,7 @@ def test_machine_code_is_python_control(drawn):
     np.testing.assert_allclose(ours.outputs, theirs.outputs, rtol=0, atol=APART * size)
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 @given(drawn=loops())
 @settings(max_examples=8)

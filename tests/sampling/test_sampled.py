@@ -414,6 +414,7 @@ def variable():
     return nlctl.compile(nlctl.paper.example_1(controller=controller))
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("changed", SAMPLINGS.values(), ids=SAMPLINGS)
 def test_a_diagram_with_overrides_is_one_that_was_made_so(variable, changed):

@@ -116,6 +116,7 @@ def test_comparator_of_a_state():
     )  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rounding", [np.floor, np.ceil, np.rint, np.trunc])
 def test_steps(rounding):
     """x' = 1 + a round(x / q): straight pieces, one behind the other."""
@@ -123,6 +124,7 @@ def test_steps(rounding):
     check(plant, [0, 0.45, 1], ["x"], {"plant.a": 0.5, "plant.q": 0.3})
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "law",
     [
@@ -408,6 +410,7 @@ def behind_a_gap(source, signal, width):
     )  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("width", [0.1, 2.0])
 def test_play_behind_a_reset(width):
     """The speed of a bouncing ball through a play that is carried, jumps, and stands."""
@@ -436,6 +439,7 @@ def test_play_behind_a_comparison():
     assert abs(end(made, "y", "source.p") - (0.4 + 1.5 * 0.4)) < 1e-7
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("actuator", "own"),
     [
@@ -496,6 +500,7 @@ def test_play_that_the_start_drives(sampled):
     assert np.allclose(made["y", "gap.c_r"], 0)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "law",
     [

@@ -36,6 +36,7 @@ JUMPS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("kind", JUMPS)
 @pytest.mark.parametrize("actuator", ["relay", "Preisach"])
 def test_what_switches_as_its_input_jumps(actuator, kind):

@@ -39,6 +39,7 @@ def of_time(t, x, u, p):
     return [p["A"] * np.sin(p["w"] * t)]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-10])
 def test_play_behind_a_delay_of_a_sine(rtol):
     """Behind the crest v = A - r; as it rises A sin(w (t - d)) - r."""

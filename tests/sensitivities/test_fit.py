@@ -23,6 +23,7 @@ def test_exact_data():
     assert found.unidentifiable == ()
 
 
+@pytest.mark.weekly
 def test_intervals_cover():
     """Of 300 fits to noisy data 95 % intervals hold the truth in 270 to 297 (3.9 sigma)."""
     rng, compiled = np.random.default_rng(5), nlctl.compile(decay())
@@ -66,6 +67,7 @@ def actuated(actuator):
     )
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("actuator", "truth"),
     [
@@ -194,6 +196,7 @@ def test_bounds_of_a_block():
         nlctl.fit(lag, t, {"v": t}, {"lag.T": -1.0}, 1.0)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("example", "truth"),
     [
@@ -244,6 +247,7 @@ def shaken_mass():
     return nlctl.interconnect({"shaker": source, "mass": mass, "spring": spring}, outputs=["y"])
 
 
+@pytest.mark.weekly
 def test_bouc_wen_benchmark():
     """At 750 Hz with noise of 8e-3 mm: as much is left as was added, and five parameters are found.
 

@@ -154,6 +154,7 @@ def test_lines_of_one_slope():
     assert np.allclose(found.intervals(), np.stack([values - width, values + width], 1), atol=1e-7)
 
 
+@pytest.mark.weekly
 def test_intervals_of_several_cover():
     """Of 200 fits 95 % intervals of slope and heights hold the truth in 178 to 200 (3.9 sigma)."""
     rng, plant, inside = np.random.default_rng(7), rise(), np.zeros(4, dtype=int)

@@ -29,6 +29,7 @@ def play(half_gap=0.5):
     return nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=half_gap, c_l=-half_gap)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("signal", "by_T", "slope"),
     [
@@ -76,6 +77,7 @@ def test_play_behind_square_waves():
     assert np.allclose(made["y", "source.A"], by_a, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "law",
     [
@@ -345,6 +347,7 @@ def test_what_sees_the_instant_of_a_step_is_refused(part):
         nlctl.sensitivity_response(loop, TIMES, 2 + HELD, with_respect_to=by, hold="zoh")
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("periodic", [False, True])
 def test_a_play_behind_a_table(periodic):
     """u = K r - t with r held at 0 and 1.5: driven left until t = 1, then right, where it stays."""

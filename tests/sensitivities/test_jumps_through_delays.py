@@ -192,6 +192,7 @@ def test_signals_that_are_not_0_before():
     assert np.allclose(made["z", "wire.before"][5:], 0.4, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("case", CASES)
 def test_against_differences(case):
     """Every derivative, to 1e-6 of the largest."""

@@ -23,6 +23,7 @@ def dead_zone(t, x, u, p):
     return [1.0, np.where((x[0] > -p["a"]) & (x[0] < p["a"]), 0.0, inner)]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("law", "count"),
     [

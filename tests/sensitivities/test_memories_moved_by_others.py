@@ -69,6 +69,7 @@ def test_play_behind_a_relay_that_is_on_at_the_start():
         assert made["v", name] == pytest.approx([slope, slope], abs=1e-9)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("f", "v", "slopes"),
     [
@@ -147,6 +148,7 @@ def held_run(d, b, q, c, t):
     return last, arc + (d + b - c) * (two - crest) + last * (t - two)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["auto", "taylor", "rodas5p"])
 def test_play_that_turns_between_samples_at_events(method):
     """A play that is driven before and behind a sample turns, and is moved by the next."""

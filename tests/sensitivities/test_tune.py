@@ -276,6 +276,7 @@ def test_unknown_names():
         nlctl.tune(lag, {"lag.T": (-1.0, 2.0)}, near, inputs=1.0)
 
 
+@pytest.mark.weekly
 def test_both_examples():
     """Gains of the paper's law: more is left of both bounds, on the published actuators."""
     space = {f"law.{name}": bounds for name, bounds in {"beta": (0.1, 50.0)}.items()}

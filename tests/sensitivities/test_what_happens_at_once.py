@@ -156,6 +156,7 @@ def test_what_is_compared_jumps(law):
         assert made["z", name] == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", 10.0 ** np.arange(-6, -12, -0.5))
 def test_memories_that_switch_right_at_their_level(rtol):
     """Relays of A cos 3 t switch and switch back at times that are symmetric: nothing by A."""

@@ -118,6 +118,7 @@ def test_start_on_one_of_many_conditions():
     assert made["x", "plant.p[0]"][-1] == 0.0
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("law", "start"),
     [
@@ -326,6 +327,7 @@ ROUNDED = [  # where it does not jump, and where it does
 ]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("rounded", "inside", "jumps"), ROUNDED)
 def test_start_where_a_number_is_rounded(rounded, inside, jumps):
     """A run starts on a condition where a rounding jumps, and nowhere else."""
@@ -337,6 +339,7 @@ def test_start_where_a_number_is_rounded(rounded, inside, jumps):
         assert bool(made.missing) == (start in jumps), start
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("rounded", "inside", "jumps"), ROUNDED)
 def test_touching_where_a_number_is_rounded(rounded, inside, jumps):
     """x = level + sin t - 1 touches the level at pi / 2: that says nothing where nothing jumps."""

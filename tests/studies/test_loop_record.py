@@ -177,6 +177,7 @@ def loop():
 """
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("old", "new", "part", "place"),
     [
@@ -219,6 +220,7 @@ def test_the_names_that_python_control_gives_do_not_count():
     assert loop_values(one, 1.0) == loop_values(other, 1.0)
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 def test_a_record_is_the_same_in_another_process():
     """Addresses, hash seeds and the order of sets are no part of it."""

@@ -95,6 +95,7 @@ def expected(names):
     return found | (NEEDS_ROWS if whole else set())
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2])
 def test_each_mistake_is_told_beside_each_other(tmp_path, count):

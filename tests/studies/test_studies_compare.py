@@ -36,6 +36,7 @@ def folder(tmp_path_factory):
     return here
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "second", "code", "words"),

@@ -133,7 +133,7 @@ def test_no_reader_believes_what_is_left(copied, name):
     is_refused_everywhere(copied)
 
 
-@settings(max_examples=40)
+@settings(max_examples=many(40))
 @given(data=st.data())
 def test_one_bit_anywhere_is_noticed(done, tmp_path_factory, data):
     """In any file of the run, at any place."""
@@ -325,7 +325,7 @@ def test_resealed_nonsense_ends_in_a_sentence(done, tmp_path_factory, data):
 
 
 @pytest.mark.weekly
-@settings(max_examples=1500)
+@settings(max_examples=many(1500))
 @given(data=st.data())
 def test_much_resealed_nonsense_ends_in_a_sentence(done, tmp_path_factory, data):
     """The same, longer."""
@@ -357,6 +357,7 @@ def test_other_formats_are_refused_by_name(copied, name, version):
         load_result(copied)
 
 
+@pytest.mark.weekly
 def test_a_run_that_continues_is_not_taken_for_intact(copied, done):
     """While it runs, or after a kill, the record is gone; --resume ends with the same one.
 

@@ -62,6 +62,7 @@ WAYS = [
 ]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("imports", "call"), WAYS)
 def test_every_way_to_import_a_neighbour(tmp_path, imports, call):
     """Modules, packages, names, relative imports inside of a package; the numbers are the same."""

@@ -90,6 +90,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("command", "name"),
     [("resume", name) for name in EDITS] + [("report", "an equation"), ("replay", "an equation")],
@@ -120,6 +121,7 @@ def test_an_option_of_a_comparison_is_part_of_the_loop(copied, command):
     assert (told.returncode, "lag.gain was 0.4, now 0.5" in told.stderr) == (2, True), told
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("name", "command"),
     [("searches", "resume")]
@@ -261,6 +263,7 @@ def test_what_was_edited_or_cut_off_is_refused_in_a_sentence(copied, number):
         assert len(told.stderr.strip().splitlines()) == 1, told.stderr
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("by", ["pandas", "bytes"])
 def test_edited_rows_are_refused_and_run_again(copied, done, by):
     """Whatever wrote them: a table without its seal is none of this run."""
@@ -282,6 +285,7 @@ def test_edited_rows_are_refused_and_run_again(copied, done, by):
     pd.testing.assert_frame_equal(made.rows.table[columns], whole.rows.table[columns])
 
 
+@pytest.mark.weekly
 def test_what_no_key_can_see_is_told_when_it_runs_and_on_the_page(tmp_path):
     """Here a function that NumPy has made of another one."""
     path = write(tmp_path, HEAD, SEARCHES)

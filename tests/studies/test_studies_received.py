@@ -154,6 +154,7 @@ def test_a_name_that_a_file_has_imported_is_not_its_own(home, name):
     assert not (base / "ran").exists()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "name",
     ["control:set_defaults", "control:reset_defaults", "control:use_fbs_defaults",
@@ -218,6 +219,7 @@ def sent(home, base, place):
 FOLDERS = [".", "..", "/", "../..", "code", "{absolute}"]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("place", FOLDERS)
 def test_a_received_folder_executes_nothing(home, tmp_path, place):
     """Wherever it says that its code is; a page is made of its data, and what runs code refuses."""

@@ -275,6 +275,7 @@ size = 8
 """
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(("part", "findings"), [("rows", 0), ("morris", 2), ("sobol", 3)])
 @pytest.mark.usefixtures("ctrl_c")

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import nlctl_here
-from examples import parted, some
+from examples import many, parted, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from resealed import reseal, write_chunk
@@ -171,6 +171,7 @@ def test_a_page_stays_that_of_a_run_as_long_as_nothing_changes(copied, paged):
     assert len(verify(copied).problems) == 3  # page, numbers, signals
 
 
+@pytest.mark.weekly
 def test_a_page_elsewhere_is_not_in_the_record(copied, tmp_path):
     """Also where that is the folder of another run: whose page it then is not."""
     other = shutil.copytree(copied, tmp_path / "other")
@@ -181,6 +182,7 @@ def test_a_page_elsewhere_is_not_in_the_record(copied, tmp_path):
     assert not verify(other).is_intact
 
 
+@pytest.mark.weekly
 def test_a_print_belongs_to_its_page(copied):
     """It is recorded with the page that it shows, and not with the next one."""
     nlctl_here("report", copied)  # the command on it names the folder
@@ -291,6 +293,7 @@ def with_change(folder, name, how, place):
     return True
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("how", SHAPES)
 @pytest.mark.parametrize("in_chunks", [False, True])
@@ -311,6 +314,7 @@ def test_a_table_of_another_shape_is_not_what_the_record_says(every_kind, tmp_pa
         assert any(name in text and ", and it has " in text for text in problems), problems
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("how", ["half of the rows", "every row twice", "no rows", "a column less"])
 def test_rows_that_are_not_those_of_the_design_are_refused(every_kind, tmp_path, how):
@@ -359,7 +363,7 @@ KINDS_ASKED = [line[8:-1] for line in EVERY_KIND.splitlines() if line.startswith
 
 
 @pytest.mark.ci
-@settings(max_examples=4)
+@settings(max_examples=many(4, part=2))
 @given(data=st.data())
 @pytest.mark.parametrize("kind", parted(KINDS_ASKED))
 def test_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data):
@@ -367,6 +371,7 @@ def test_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data)
     any_change_ends_in_a_sentence(run_of(kind), tmp_path_factory.mktemp("any") / "out", data)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("how", CHANGES)
 def test_every_column_of_kept_rows_may_be_anything(run_of, tmp_path, how):
@@ -385,7 +390,7 @@ def test_every_column_of_kept_rows_may_be_anything(run_of, tmp_path, how):
 
 
 @pytest.mark.weekly
-@settings(max_examples=80)
+@settings(max_examples=many(80))
 @given(data=st.data())
 @pytest.mark.parametrize("kind", KINDS_ASKED)
 def test_many_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data):

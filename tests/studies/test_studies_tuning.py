@@ -63,6 +63,7 @@ def margins(rate, x0):
     return np.minimum(1 - 2 * x0 * np.exp(-rate), 20 * x0 * np.exp(-2 * rate) - 1)
 
 
+@pytest.mark.weekly
 def test_largest_least_margin(result):
     """Over three draws: that of the grid of all rates, in closed form, to 2e-3."""
     found = result["tuning"]

@@ -97,6 +97,7 @@ def check(kind, signals, starts):
     return found
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_runs_from_the_set_keep_the_bounds(kind):
@@ -127,6 +128,7 @@ PROOF_USES = {  # states besides the plant's that each proof depends on
 }
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "state"), [(kind, state) for kind, states in PROOF_USES.items() for state in states]

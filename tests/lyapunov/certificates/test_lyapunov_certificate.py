@@ -119,6 +119,7 @@ class TestTracking:
 
 
 class TestCertify:
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize(
         ("loop", "k", "known"),
@@ -192,6 +193,7 @@ class TestCertify:
         """sigma_2 = 0 makes alpha_1 = 0: no bound for all time."""
         assert not certified(example_1(sigma_2=0.0)).holds
 
+    @pytest.mark.weekly
     @pytest.mark.ci
     def test_parameters_of_the_run_count(self):
         """The same override that a run takes changes the proof."""

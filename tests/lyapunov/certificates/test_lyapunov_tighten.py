@@ -24,6 +24,7 @@ def found():
     return tighten(loop(), u_limit=LIMIT, horizon=2.0, evaluations=14)
 
 
+@pytest.mark.weekly
 def test_the_bound_gets_smaller_within_the_limit():
     """The published gains are the first trial; the best one keeps the limit of |u|."""
     first = found().trials[0]

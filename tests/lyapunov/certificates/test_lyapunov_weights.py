@@ -74,6 +74,7 @@ def test_minimax_is_never_worse_than_least_squares():
     assert np.abs(bounded).max() <= 10 + 1e-9
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", [DUFFING, GENESIO])
 def test_diagonal_centres_cannot_do_better_than_the_pair_bound(plant):
@@ -128,6 +129,7 @@ def test_without_decay_the_tightest_weights_make_alpha_0_small():
     assert mine < none
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", [DUFFING, GENESIO])
 def test_the_proved_error_is_above_the_grid_s_and_close(plant):

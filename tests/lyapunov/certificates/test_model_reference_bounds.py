@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from examples import many
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -38,6 +39,7 @@ def largest_energy(inequality, Gamma, P, span=8.0, count=801):
     return float(V[inequality(e, W_hat, d) > 0].max())
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("Gamma", "sigma_1"), [(5.0, 0.2), (2.0, 0.1), (20.0, 0.5), (1.0, 3.0)])
 def test_sigma_modification_is_at_most_completed_squares(Gamma, sigma_1):
     """V <= c max(1/k, 1/(Gamma sigma)), c = P D^2/k + sigma W^2; equal where k = Gamma sigma."""
@@ -182,6 +184,7 @@ def test_a_function_that_a_network_does_not_span_is_bounded_on_the_box():
     assert better.W == (-0.9, 0.0, 0.9)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(("K", "closes"), [((1.5, 1.3), False), ((25.0, 10.0), True)])
 def test_a_network_of_wing_rock_needs_a_strong_model(K, closes):
@@ -295,6 +298,7 @@ def test_names_and_nesting_do_not_matter():
     assert certify(nested, params={"autopilot.weights.sigma_1": 0.4}).V_max != flat.V_max
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", ["weights.Gamma", "error.Q", "model.b", "law.gain"])
 def test_each_parameter_of_the_run_is_the_one_of_the_proof(name):
     """As if the blocks had been made with it."""
@@ -329,7 +333,7 @@ def test_weights_of_ones_own_choice():
         certify(nlctl.paper.example_1(), W=(1.0,))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=many(50), deadline=None)
 @given(
     poles=st.lists(st.floats(0.2, 5.0), min_size=1, max_size=3),
     Q=st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3),

@@ -257,6 +257,7 @@ class TestNoneIsCertified:
         for loop in (first_order(sigma(), d=half_sine), wing_rock(sigma(nodes=6))):
             assert certify(loop).holds
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("what", REFUSED)
     def test_refused_by_name(self, what):
         """The refusal names the block, and what is wrong with it."""
@@ -293,6 +294,7 @@ class TestNoneIsCertified:
         assert not found.holds
         assert found.e == np.inf
 
+    @pytest.mark.weekly
     def test_a_regressor_without_a_bound(self):
         """Where psi has a pole in the box there is no bound of u, and no solution for all time."""
         basis = again(nlctl.controllers.WingRockRegressor, output=pole)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mrac_loops import SINE, e_modification, first_order, projection, sigma, wing_rock
@@ -95,9 +96,10 @@ def signals(loop, run, found):
     return E, W_hat, np.linalg.norm(W_hat - np.array(found.W)[:, None], axis=0)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=many(12, part=2), deadline=None)
 @given(seed=st.integers(0, 10**6), kind=st.sampled_from(["constant", "square", "chirp", "steps"]),
        share=st.floats(0.0, 1.0))  # fmt: skip
 def test_runs_keep_what_is_proved(name, seed, kind, share):
@@ -129,7 +131,7 @@ def test_runs_keep_what_is_proved(name, seed, kind, share):
         assert np.abs(E[0][end]).max() <= reach * ROUND
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 @settings(max_examples=8, deadline=None)
 @given(order=st.integers(1, 3), seed=st.integers(0, 10**6))
 def test_plants_of_order_one_to_three(order, seed):
@@ -189,7 +191,7 @@ def drawn_actuator(rng):
 
 
 @pytest.mark.weekly
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=many(25, part=4), deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_whatever_is_certified_holds(seed):
     """Drawn plants that no regressor spans, gains that laws do not know, actuators: never beyond.

@@ -322,6 +322,7 @@ class TestNoneIsCertified:
         with pytest.raises(DiagramError, match=said):
             certify(make())
 
+    @pytest.mark.parted
     @pytest.mark.slow
     @pytest.mark.parametrize("what", TIME)
     def test_time(self, what):

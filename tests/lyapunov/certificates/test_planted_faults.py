@@ -268,6 +268,7 @@ def assert_caught(what):
     assert found[key].follows
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("what", QUICK)
 def test_faults_are_named(what):
@@ -276,11 +277,11 @@ def test_faults_are_named(what):
 
 
 OTHERS = [what for what in FAULTS if what not in QUICK]
-PARTS = [pytest.mark.ci, *[pytest.mark.weekly] * 5]  # a sixth in every `.ci/run`
+PARTS = [pytest.mark.ci, *[pytest.mark.weekly] * 11]  # a twelfth in every `.ci/run`
 
 
 @pytest.mark.parametrize(
-    "what", [pytest.param(what, marks=PARTS[i % 6]) for i, what in enumerate(OTHERS)]
+    "what", [pytest.param(what, marks=PARTS[i % 12]) for i, what in enumerate(OTHERS)]
 )
 def test_all_faults_are_named(what):
     """Each of them by the line that it breaks; most of them once a week."""
@@ -351,6 +352,7 @@ def healthy(what):
     )
 
 
+@pytest.mark.parted
 @pytest.mark.ci
 @pytest.mark.parametrize("what", HEALTHY)
 def test_no_false_alarm(what):

@@ -71,6 +71,7 @@ def test_every_proof_for_loops_is_rechecked():
 
 
 # a sliding mode is proved, saved and rechecked each day in test_recheck
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "kind",

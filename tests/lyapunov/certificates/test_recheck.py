@@ -77,6 +77,7 @@ def content(tmp_path_factory):
     return json.loads(file.read_text())
 
 
+@pytest.mark.parted
 def test_the_answer_is_yes(saved, capsys):
     """With bounds that are those of the certificate, to a few percent, and its starts."""
     found, file = saved
@@ -90,6 +91,7 @@ def test_the_answer_is_yes(saved, capsys):
     assert f"for all t >= 0 from {begins}" in said
 
 
+@pytest.mark.parted
 def test_nothing_but_python_takes_part(saved, tmp_path):
     """A copy of the package alone, without any third-party package, says the same."""
     _, file = saved
@@ -155,6 +157,7 @@ TRUE = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("what", WRONG)
 def test_what_does_not_follow_is_answered_with_no(content, what, tmp_path, capsys):
     """Whether or not the file was sealed anew; and never with a traceback."""

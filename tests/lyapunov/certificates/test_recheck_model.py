@@ -241,6 +241,7 @@ def test_the_premises_are_printed(contents, way, factor):
     assert premises[0] != premises[1]
 
 
+@pytest.mark.weekly
 def test_no_other_proof_gives_less_than_what_runs_do():
     """Numbers of the proof moved at random: what is still accepted holds along runs."""
     loop, rng = driven(sigma()), random.Random(1)

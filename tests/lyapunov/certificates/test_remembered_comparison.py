@@ -117,6 +117,7 @@ def other_signals(loop):
     loop._compute_static_io = computed
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     "plant", [swapped_output, rewired, other_rates, other_rates_of_a_block, other_signals]
 )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -55,8 +56,8 @@ def test_it_shrinks_with_the_disturbance_and_with_the_layer():
     assert small.ultimate == pytest.approx(large.ultimate / 10, rel=0.05)
 
 
-@pytest.mark.slow
-@settings(max_examples=15, deadline=None)
+@pytest.mark.weekly
+@settings(max_examples=many(15, part=2), deadline=None)
 @given(x1=st.floats(-1, 1), x2=st.floats(-1, 1), a=st.floats(0, 1), K=st.floats(8, 30))
 def test_runs_keep_the_bound(x1, x2, a, K):
     """From drawn starts, with drawn disturbances and gains: for all time, and in the end."""

@@ -96,6 +96,7 @@ def test_the_loop_without_a_difference_is_certified():
     assert certify(wired(of=SLIDING)).status == "proved"
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("what", DIFFERENCES)
 def test_a_difference_is_refused_or_undecided(what):
     """What is undecided says what is missing."""

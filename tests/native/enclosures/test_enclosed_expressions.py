@@ -142,6 +142,7 @@ def function_code(function, sides):
 BOX = np.array([-1.0, -2.0]), np.array([2.0, 1.5])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("function", "supremum"),
     [

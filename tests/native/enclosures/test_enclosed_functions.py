@@ -47,6 +47,7 @@ def exact(name, x):
         return FUNCTIONS[name].enclosure(arb(x))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", SMOOTH)
 def test_an_enclosure_at_a_point_holds_the_value_and_little_more(name):
     """The stated error bound of the function in use is kept: nothing is outside."""

@@ -65,6 +65,7 @@ def loop(function):
                            name="loop")  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_runs_agree_with_python_control(function):
@@ -92,6 +93,7 @@ def test_right_hand_sides_are_python_controls_own(function):
         np.testing.assert_allclose(found, made.dynamics(t, x, u, {"k": 2.5}), rtol=1e-15)
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @needs_jit
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -316,6 +318,7 @@ def reads(t, x, u, params):
     return [total, params["names"][0] * x[1]]
 
 
+@pytest.mark.weekly
 @needs_jit
 def test_numba_reads_parameters_as_a_dict_is_read():
     """By keys, with `get` and `in`; a parameter may be named ``get``; nothing calls back."""

@@ -8,6 +8,7 @@ import runpy
 import cloudpickle
 import control as ct
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -56,7 +57,7 @@ def remember(text, file):
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=many(60), deadline=None)
 @given(st.sets(st.integers(1, len(STATEMENTS) - 1)))
 def test_every_division_into_cells_has_the_source_of_the_file(ends):
     """As of a notebook, which compiles each statement, and of a gallery, which has cells."""
@@ -68,7 +69,7 @@ def test_every_division_into_cells_has_the_source_of_the_file(ends):
         assert ast.dump(definition(function)) == ast.dump(definition(same))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=many(30, part=4), deadline=None)
 @given(
     st.sets(st.integers(1, len(STATEMENTS) - 1)),
     st.sampled_from([("K *", "3 *"), ("np.exp", "np.sin"), ("cmath.pi", "cmath.e ")]),

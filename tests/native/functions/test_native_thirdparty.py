@@ -152,7 +152,7 @@ def halved(v):
     return v if v < 1.0 else halved(0.5 * v)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_a_function_that_calls_itself_until_its_value_is_small_is_called_in_python():
     """numba has no recursion across functions."""
     block = system(lambda t, x, u, params: [halved(x[0]), x[1]])

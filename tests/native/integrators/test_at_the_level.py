@@ -26,6 +26,7 @@ def position(t, x, u, params):
     return x[0]
 
 
+@pytest.mark.parted
 @how
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_what_begins_at_0_and_leaves_it_is_an_event(how, way):
@@ -141,6 +142,7 @@ def test_resets_at_given_times_are_rows_of_the_table(how):
     assert made.outputs.ravel()[-1] == pytest.approx(wanted, abs=1e-5)
 
 
+@pytest.mark.parted
 @how
 @pytest.mark.parametrize("width", [0.05, 0.005])
 def test_a_pulse_of_a_ten_thousandth_of_the_run(how, width):
@@ -170,6 +172,7 @@ def declared(made):
     return made.events["time"][made.events["block"].str.startswith("fault")].to_numpy()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("step", [0.25, 0.1])
 def test_steps_that_end_at_a_declared_break_point_note_it(method, step):
@@ -178,6 +181,7 @@ def test_steps_that_end_at_a_declared_break_point_note_it(method, step):
     np.testing.assert_allclose(declared(made), [1.0, 2.5], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parted
 @how
 def test_a_break_point_at_which_a_condition_jumps_is_noted_as_well(how):
     """The input of both conditions jumps where the signal is back: 0.6 instead of 0."""

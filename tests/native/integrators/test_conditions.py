@@ -166,6 +166,7 @@ def end(case, **how):
     return float(made.outputs[0, -1]), made
 
 
+@pytest.mark.parted
 @every_case
 @pytest.mark.parametrize(("method", "rtol"), HOW)
 def test_every_method_meets_them(case, method, rtol):
@@ -175,12 +176,14 @@ def test_every_method_meets_them(case, method, rtol):
     assert made.statistics.status is nlctl.native.Status.OK
 
 
+@pytest.mark.parted
 @every_case
 def test_the_reference_meets_them(case):
     found, _ = end(case, engine="python-control")
     assert found == pytest.approx(CASES[case][3], abs=1e-4 if case == "stairs" else 1e-6)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("case", ["window", "oscillator", "clipped", "stairs"])
 def test_members_of_an_ensemble_are_what_they_are_alone(case):
     equations, start, last, _ = CASES[case]
@@ -242,6 +245,7 @@ def test_functions_that_a_run_watches_end_it_by_every_method():
         np.testing.assert_allclose(made.events["time"], np.pi * np.array([1 / 3, 5 / 6]), atol=1e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", [*METHODS, None])
 def test_a_function_that_is_0_where_a_step_ends_anyway_is_an_event(method):
     """At t = 5 the input has a break point, and x = 1 - t rounds to 0 at t = 1."""
@@ -266,6 +270,7 @@ def test_print_and_statistics_say_what_is_located():
     assert (made.statistics.conditions, made.statistics.opaque) == (1, False)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("case", ["duty cycle", "oscillator", "square wave", "clipped"])
 def test_statistics_count_the_rows_of_the_table(case):
     """Of a single run; members of an ensemble count the same."""

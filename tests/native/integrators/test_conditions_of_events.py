@@ -73,6 +73,7 @@ def test_a_guard_behind_a_pulse(source, method, rtol):
     np.testing.assert_allclose(found.outputs.reshape(-1), SINCE_A_HALF, atol=max(rtol, 1e-8))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_a_guard_with_a_pulse_of_its_own(method, rtol):
@@ -109,6 +110,7 @@ def seen(found, name):
     return own["time"].to_numpy(), own["direction"].tolist()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("method", "engine"), ENGINES)
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_event_functions_with_pulses(method, engine, rtol):
@@ -124,6 +126,7 @@ def test_event_functions_with_pulses(method, engine, rtol):
         assert ways == ["rising", "falling"] * (at.size // 2)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("method", "engine"), ENGINES)
 def test_a_run_ends_at_a_pulse(method, engine):
     """Where the state is first within 0.1 ms of 3, and where t is: a jump of the function."""
@@ -149,6 +152,7 @@ class Bouncing:
     reset = staticmethod(lambda t, x, u, p: (0.0 * x[0], -0.5 * x[1]))
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("method", "engine"), ENGINES)
 def test_what_jumps_through_zero_is_an_event(method, engine):
     """The speed of a ball leaves 0, rises through it at each bounce, and falls at each summit."""

@@ -33,6 +33,7 @@ def test_rest_is_reached(law, method):
     assert np.abs(response.outputs - exact).max() < 1e-6
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("law", [LAWS["sign"], LAWS["if"], LAWS["copysign"], LAWS["heaviside"]])
 def test_no_polynomial_leads_away_from_rest(law):
     """Near 0 Taylor's method knows little of sqrt(|x|): it says so, or is right."""

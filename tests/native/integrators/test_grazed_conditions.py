@@ -54,6 +54,7 @@ def closing(t, x, u, params):
     return [np.where(x[0] <= 600, 0.0, -88.0 + 0.01 * (x[0] - 600) + np.sin(3 * t))]
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
 def test_a_state_that_stops_where_its_rate_ends(method, rtol):

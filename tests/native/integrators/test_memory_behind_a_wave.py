@@ -53,6 +53,7 @@ def test_every_frequency(wave, actuator, behind, turns):
     assert np.allclose(many.signals["v"][:, 2:], behind(TIMES[2:]), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("w", np.linspace(4.0, 4.03, 5))
 def test_every_frequency_in_python_control(w):
     loop = driven(WAVES["sign"], nlctl.actuators.Stop(r=0.7), 0.3)

@@ -54,6 +54,7 @@ def test_a_band_of_a_state(f, how):
     np.testing.assert_allclose(response.outputs, [0, 0, WIDTH, 2 * WIDTH], atol=2e-5)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
 @pytest.mark.parametrize("f", PEAKS.values(), ids=PEAKS)
 def test_whatever_the_tolerance(f, method):

@@ -33,6 +33,7 @@ def end_of(a, b, k):
     return b + END - leaves if leaves < END else a + (END - a) * (1 + k)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
 @pytest.mark.parametrize("rtol", [1e-5, 1e-9])
 def test_windows_of_any_width_and_height(compiled, method, rtol):

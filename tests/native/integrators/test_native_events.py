@@ -376,6 +376,7 @@ class TestIdealRelay:
         np.testing.assert_allclose(x[::8], 0.5, atol=1e-6)
         assert made.statistics.events == 6
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_sliding_ends_with_a_status(self, method):
         """x' = 0.5 - 1.5 sign x slides from t = 0.5 on: no run may take that for a motion."""
@@ -389,6 +390,7 @@ class TestIdealRelay:
         else:
             assert made.statistics.status is Status.CHATTERING
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_a_chattering_memory_ends_with_a_status(self, method):
         """A relay with memory whose thresholds coincide: x stays at them, or the run ends."""

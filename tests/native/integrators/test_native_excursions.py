@@ -9,7 +9,7 @@ import functools
 import control as ct
 import numpy as np
 import pytest
-from examples import crossed
+from examples import crossed, many
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -70,7 +70,7 @@ beyond = st.floats(-6, -0.03).map(lambda power: 10.0**power)  # the band, in amp
 @example(A=1.5, w=1.0, d=0.141, periods=2)
 @example(A=1.0, w=1.0, d=1e-4, periods=5)
 @example(A=1.4580254319059893, w=0.7263952884013972, d=4.742060308e-07, periods=5)
-@settings(max_examples=25)
+@settings(max_examples=many(25, part=4))
 def test_no_excursion_is_stepped_over(driven, method, A, w, d, periods):
     """The integral of what passes the zone is right to tolerance, however shallow that is."""
     end, exact = periods * 2 * np.pi / w, area(A, w, 1 - d, periods)
@@ -81,7 +81,7 @@ def test_no_excursion_is_stepped_over(driven, method, A, w, d, periods):
 
 
 @given(w=frequencies, d=beyond)
-@settings(max_examples=10)
+@settings(max_examples=many(10, part=2))
 def test_nor_with_a_pair_of_ones_own(w, d):
     """Without stages at three parts of a step, the solution is evaluated inside of it."""
     run = nlctl.input_output_response(
@@ -92,7 +92,7 @@ def test_nor_with_a_pair_of_ones_own(w, d):
 
 
 @given(d=beyond, step=st.floats(0.01, 0.5))
-@settings(max_examples=10)
+@settings(max_examples=many(10, part=2))
 def test_nor_with_fixed_steps(d, step):
     """Steps end at events all the same; how far apart they are is the user's choice."""
     run = nlctl.input_output_response(
@@ -145,11 +145,12 @@ def beside_a_play():
     return nlctl.compile(loop)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @given(A=amplitudes, w=frequencies, d=beyond, gap=beyond, periods=st.integers(1, 3))
 @example(A=1.0, w=0.05, d=1e-6, gap=1e-6, periods=1)  # turns that rounding blurs
 @example(A=1.0, w=0.05, d=1e-6, gap=1e-5, periods=2)
-@settings(max_examples=25)
+@settings(max_examples=many(25, part=4))
 def test_nor_where_there_are_memories(method, A, w, d, gap, periods):
     """A play is carried by how far the wave leaves its gap, and a dead zone beside it works on."""
     run = nlctl.input_output_response(
@@ -162,9 +163,10 @@ def test_nor_where_there_are_memories(method, A, w, d, gap, periods):
     assert run.outputs[1, -1] == pytest.approx(gap * A, rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @given(w=st.floats(0.3, 30), deep=st.floats(-3, -0.5).map(lambda power: 10.0**power))
-@settings(max_examples=25)
+@settings(max_examples=many(25, part=4))
 def test_a_memory_that_turns_twice_within_a_step(method, w, deep):
     """u = t + A sin(w t), hardly falling: the play keeps its peak until u is there again."""
     A = (1.0 + deep) / w

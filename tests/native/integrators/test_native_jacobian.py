@@ -46,6 +46,7 @@ def diagram(name):
 class TestExact:
     """Machine code along directions, against other ways to the same numbers."""
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("name", ["example_1", "example_2", "forced", *PROBLEMS])
     def test_columns_are_those_of_the_linearization(self, name):
         """Which evaluates the expressions one by one, in NumPy; time is by central differences."""
@@ -180,6 +181,7 @@ class TestBacklashInAStiffLoop:
                 made = from_2_5(example_2, [0.0, end], "rodas5p", rtol)
                 assert float(made.outputs[i, -1]) == pytest.approx(v, rel=10 * rtol)
 
+    @pytest.mark.weekly
     @pytest.mark.ci
     def test_the_drift_of_zeta_is_the_same_by_all_methods(self, example_2):
         """Over 100 s: zeta drifts by 1.1e-2, and all agree to a thousandth of that and better."""

@@ -7,6 +7,7 @@ import control as ct
 import numba
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import special
@@ -83,7 +84,7 @@ def solved(order, diagonal, matrix, b):
 
 
 class TestElimination:
-    @settings(max_examples=60)
+    @settings(max_examples=many(60))
     @given(st.integers(1, 12), st.floats(0.0, 0.6), st.integers(0, 10**6))
     def test_it_covers_the_factors_of_any_matrix_of_its_structure(self, n, density, seed):
         """Without pivoting L and U of the permuted matrix have no entry elsewhere."""
@@ -119,7 +120,7 @@ class TestElimination:
 
 
 class TestSolution:
-    @settings(max_examples=60)
+    @settings(max_examples=many(60))
     @given(st.sampled_from([arrow, banded]), st.integers(16, 24), st.integers(0, 10**6))
     def test_it_is_lapacks(self, shape, n, seed):
         rng = np.random.default_rng(seed)
@@ -176,6 +177,7 @@ def heat(n):
 
 
 class TestStructure:
+    @pytest.mark.parted
     @pytest.mark.parametrize("name", ["example_1", "example_2", "heat", *PROBLEMS])
     def test_it_holds_every_derivative_that_is_not_0(self, name):
         """At random points; of the two examples most entries are known to be 0."""

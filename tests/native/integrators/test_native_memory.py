@@ -11,6 +11,7 @@ from typing import Any
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from numba.core import config
@@ -260,6 +261,7 @@ class TestTurningValues:
         exact = at_times(u_of, spec.turning_times(25.0), times)
         np.testing.assert_allclose(made.outputs[2], exact, atol=1e-9)
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("v0", [-5.0, -0.6, 0.0, 0.3, 0.72, 5.0])
     def test_it_starts_in_the_band(self, driven, v0):
         """A memory outside the gap is brought to its nearer side at t = 0, inside it stays."""
@@ -334,7 +336,7 @@ class TestSampledInput:
     """Inputs given as samples turn at the samples: clipping from sample to sample is exact."""
 
     @given(some.lists(some.floats(-4, 4), min_size=2, max_size=20), some.floats(-1, 1), some.data())
-    @settings(max_examples=25)
+    @settings(max_examples=many(25, part=4))
     def test_any_polygon(self, sampled, values, v0, data):
         """Whatever the polygon and its time grid."""
         widths = data.draw(
@@ -344,7 +346,7 @@ class TestSampledInput:
         np.testing.assert_allclose(made.outputs, followed(values, v0), atol=1e-9)
 
     @given(some.lists(some.floats(-4, 4), min_size=8, max_size=8), some.floats(0, 2))
-    @settings(max_examples=15)
+    @settings(max_examples=many(15, part=2))
     def test_the_play_preserves_order(self, sampled, values, more):
         """A larger input never gives a smaller output, and at most the slope times as much more."""
         times, values = np.arange(8.0), np.array(values)
@@ -460,6 +462,7 @@ class TestExample2:
 
     FIGURES = {"x1": 0.155675746380, "x2": -0.02691235195, "zeta": 1.53306191709}
 
+    @pytest.mark.parted
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor", "auto"])
     def test_it_reaches_the_figures(self, loop, method):
         """x1, x2 and zeta at 20 s and the tail's largest error, computed independently."""

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import control as ct
 import numpy as np
 import pytest
-from examples import crossed, parted
+from examples import crossed, many, parted
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -118,7 +118,7 @@ ends = st.floats(0.05, 1.6).filter(lambda t: min(abs(t - s) for s in (*TIMES, 0.
 @pytest.mark.parametrize(("name", "method"), crossed([*ACTUATORS], ["tsit5", "rodas5p", "taylor"]))
 @given(heights=heights, end=ends)
 @example(heights=(-0.15, 0.01, 0.01), end=0.52)
-@settings(max_examples=10)
+@settings(max_examples=many(10, part=2))
 def test_behind_a_corner(name, method, heights, end):
     """It keeps what it was just before the input jumped back."""
     params = {f"jumps.a_{k + 1}": a for k, a in enumerate(heights)}
@@ -131,7 +131,7 @@ def test_behind_a_corner(name, method, heights, end):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", parted(ACTUATORS, part=2))
 @given(gain=st.floats(-3.0, 2.0).filter(lambda a: abs(a) > 0.01), end=st.floats(0.05, 1.6))
-@settings(max_examples=10)
+@settings(max_examples=many(10, part=2))
 def test_behind_a_sampled_block(name, gain, end):
     """Or before the next sample is held."""
     if abs(end / 0.25 - round(end / 0.25)) < 1e-3:
@@ -144,7 +144,7 @@ def test_behind_a_sampled_block(name, gain, end):
 
 @pytest.mark.parametrize("name", parted(ACTUATORS))
 @given(heights=heights, end=ends)
-@settings(max_examples=10)
+@settings(max_examples=many(10, part=2))
 def test_behind_a_delay(name, heights, end):
     """Or before a jump arrives at the end of a transport delay."""
     params = {f"jumps.a_{k + 1}": a for k, a in enumerate(heights)}
@@ -154,6 +154,7 @@ def test_behind_a_delay(name, heights, end):
     assert run.outputs[0, -1] == pytest.approx(wanted, abs=2e-7)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
 @pytest.mark.parametrize("rtol", np.logspace(-11, -6, 11))
 def test_behind_a_condition_of_a_state(method, rtol):

@@ -98,6 +98,7 @@ def run(compiled, times, x0, **more):
 # -- coefficients
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", sorted(SERIES))
 def test_the_coefficients_of_each_function_are_those_of_its_power_series(name):
     """z' = f(x, y) along x' = 1 - 0.3 x^2, y' = x: against python-flint's series of x and y."""
@@ -358,6 +359,7 @@ def test_a_dead_zone_behind_a_sine_has_its_closed_form():
     assert np.max(np.abs(found.states - exact.states)) < 1e-9
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(
     ("kink", "integral"),
     [

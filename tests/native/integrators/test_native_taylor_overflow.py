@@ -69,6 +69,7 @@ def ran(update, x0, method, **more):
     )
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", ["taylor", "auto"])
 @pytest.mark.parametrize("update", list(CLOSED))
 def test_the_integral_is_the_closed_form(update, method):

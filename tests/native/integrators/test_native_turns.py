@@ -139,6 +139,7 @@ def test_progress_is_reported_by_steps_and_not_by_turns():
     assert seen[-1] == 60.0
 
 
+@pytest.mark.weekly
 def test_what_costs_more_turns_sooner():
     """The same motion in fewer than 600 steps, which cost a turn where rates cost much."""
     times = np.linspace(0, 24, 25)

@@ -59,6 +59,7 @@ def behind_a_wave(width, relay):
     return nlctl.interconnect({"relay": relay(width=width), "plant": plant}, outputs=["y"])
 
 
+@pytest.mark.parted
 @every_relay
 @methods
 @pytest.mark.parametrize("width", [0.5, 1e-3, 1e-12, 0.0])
@@ -94,6 +95,7 @@ def test_a_closed_loop_oscillates_between_the_thresholds(relay, method):
     np.testing.assert_allclose(made.states[1], wanted, rtol=0, atol=1e-5)
 
 
+@pytest.mark.parted
 @every_relay
 @methods
 @pytest.mark.parametrize("width", [1e-12, 0.0])

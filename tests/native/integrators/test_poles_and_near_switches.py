@@ -33,6 +33,7 @@ WINDOWS = {
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", METHODS, ids=lambda how: "-".join(how.values()))
 @pytest.mark.parametrize("rates", WINDOWS, ids=lambda rates: rates.__name__)
 def test_a_pole_of_what_is_compared_is_a_switch(rates, how):
@@ -100,6 +101,7 @@ class Megahertz:
         return (x[0] - 1.0,)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", METHODS, ids=lambda how: "-".join(how.values()))
 def test_fast_jumps_late_in_time_are_no_accumulation(how):
     # a period of 1e-6 s is a thousand roundings of a time of 1e5 s and more
@@ -137,6 +139,7 @@ BELLS = {
 }  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", METHODS, ids=lambda how: "-".join(how.values()))
 @pytest.mark.parametrize("rates", BELLS, ids=lambda rates: rates.__name__)
 def test_a_narrow_window_of_a_bell_is_not_stepped_over(rates, how):

@@ -86,6 +86,7 @@ def flowing(f):
     )  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("name", "how"), ways(RATES))
 def test_integrals_of_pulses(name, how):
     f, integral = RATES[name]
@@ -96,6 +97,7 @@ def test_integrals_of_pulses(name, how):
         assert run.outputs[-1] == pytest.approx(integral, abs=1e-5)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("name", "how"), ways(OPEN))
 def test_integrals_of_pulses_with_parameters(name, how):
     f, integral = OPEN[name]
@@ -137,6 +139,7 @@ def test_high_powers_of_a_wave(method):
     assert run.states[1, -1] == pytest.approx(0.2 * np.mean(above(grid) > 0), abs=1e-6)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("how", WAYS, ids=IDS)
 def test_sharp_functions_of_waves(how):
     """exp(k (cos z - 1)) is a pulse in each wave of z' = 1: 2 pi I_0(k) exp(-k) each."""
@@ -239,6 +242,7 @@ def test_both_sides_are_equal_at_the_last_instant(method, start):
     assert run.states[1, -1] == pytest.approx(known, abs=1e-6)
 
 
+@pytest.mark.weekly
 def test_waves_of_a_condition_in_the_reference():
     """sin(40 z) is above 0.99 for 2 acos(0.99) / 40 in each of 12 waves, all within one step."""
     compared = flowing(lambda z: 1.0 if np.sin(40 * z) > 0.99 else 0.0)

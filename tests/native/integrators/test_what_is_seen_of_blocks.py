@@ -14,6 +14,7 @@ SEEN = {  # of q, halved, and what a run over 9 s integrates of them
 }
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", SEEN)
 def test_a_block_that_is_given_its_own_output(name, method):

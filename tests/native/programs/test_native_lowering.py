@@ -76,6 +76,7 @@ def test_random_diagrams_agree_with_python_control(diagram, seed, lanes):
     assert not lowered.opaque
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("lanes", [1, 8])
 @pytest.mark.parametrize("make", [nlctl.paper.example_1, nlctl.paper.example_2])
 def test_examples_in_machine_code(make, lanes):
@@ -322,6 +323,7 @@ def blocks():
                     yield thing
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("record", list(blocks()), ids=lambda record: record.__name__)
 def test_nlctls_blocks_are_traced(record):
@@ -420,6 +422,7 @@ def test_arguments_stay_as_they_are_and_parts_are_views():
     np.testing.assert_array_equal(y, [[1.5, -3.0], [1.0, -2.0], [1.0, -2.0], [0.5, -1.0]])
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("n", [6, 20])
 @pytest.mark.parametrize(
     "places", [[0, 2, 1, 1, -1], [5, 3, 1], [], list(range(1, 13)), list(range(18, 1, -2))]

@@ -8,6 +8,7 @@ from pathlib import Path
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core import config
@@ -35,7 +36,7 @@ def solved(diagram):
     return nlctl.compile(diagram, algebraic_loops="solve")
 
 
-@settings(max_examples=60)
+@settings(max_examples=many(60))
 @given(st.integers(1, 6), st.integers(0, 10**6))
 def test_a_newton_step_is_the_solution_of_its_equations(n, seed):
     """Against LAPACK; rows that must be exchanged among them."""
@@ -128,6 +129,7 @@ def residuals(k, x, y, w):
     return np.cos(x) - 0.5 * y - y, 0.5 * p - q - w
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("x", [-1.0, 0.2, 3.0])
 @pytest.mark.parametrize("k", [0.3, -0.8])
 def test_loops_behind_each_other(k, x):
@@ -139,6 +141,7 @@ def test_loops_behind_each_other(k, x):
     np.testing.assert_allclose(compiled.dynamics(0.0, [x], (), {"k": k}), -x + w, rtol=1e-14)
 
 
+@pytest.mark.weekly
 @needs_jit
 def test_members_with_loops_run_side_by_side():
     """Each as alone, bit for bit, and as in python-control with the loop solved by hand."""

@@ -97,6 +97,7 @@ def copied(record, found):
         found.whole[4 + i] = record.cube.shape[i]
 
 
+@pytest.mark.weekly
 @pytest.mark.ci
 @given(RECORDS)
 def test_every_field_is_the_same_in_machine_code(record):

@@ -92,6 +92,7 @@ def stepped(made, u):
     return np.array(y).T, np.array(x).T
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_steps_are_one_run_bit_for_bit(name):
     """Memories, clocks, delays, events and the integrator's steps go on, also past a window."""
@@ -111,6 +112,7 @@ def test_functions_of_t_agree_to_the_tolerances(dt):
     assert np.ptp(y[0, round(19 / dt) :]) > 0.5  # the pulse at 20 s is seen
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_what_was_restored_goes_on_as_before(name):
     compiled, u = nlctl.compile(SYSTEMS[name]()), inputs(1, 40)

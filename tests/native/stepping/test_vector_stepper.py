@@ -18,6 +18,7 @@ def same(many, alone):
     assert many.messages == tuple(each.message for each in alone)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_members_are_steppers_bit_for_bit(name):
     """Past a window, and with some that begin again on the way."""

@@ -89,6 +89,7 @@ def test_play_and_rate_limits_are_not_overshot(parts, h, phase, n, share):
     assert highest(t, slow) <= x.max() + beyond
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("n", range(5, 12))
 def test_two_levels_have_no_values_beyond(n):
     """All 2^n rows of two levels: no polynomial is put through any of them."""
@@ -188,6 +189,7 @@ def test_settling_dwelling_and_travel_see_jumps_where_they_are():
     assert metrics.total_variation(t, y, breaks) == pytest.approx(way, abs=1e-9)
 
 
+@pytest.mark.weekly
 def test_numbers_with_breaks_are_the_same_in_machine_code():
     t = np.linspace(0, 5, 301)
     y = np.where(t < 2.2222, np.sin(4 * t), -0.5 * np.cos(t))

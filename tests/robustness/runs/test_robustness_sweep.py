@@ -51,6 +51,7 @@ def whole(made, design):
     return sweep(made, design, threads=1).table
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize(("threads", "chunk"), [(2, None), (1, 17), (2, 90), (1, 1000)])
 def test_threads_and_chunks_do_not_change_the_table(made, design, whole, threads, chunk):
     """Bit for bit, diverged runs and their graded margins included."""

@@ -18,6 +18,7 @@ def moved(row, rng):
     }  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [
     "AT1", pytest.param("AFC29", marks=pytest.mark.weekly), "NN.03", "CC1", "SC",
@@ -36,6 +37,7 @@ def test_machine_code_is_python_controls_at_points_of_a_run(key):
     assert np.isfinite(run.outputs).all()
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("key", ["NN.03", "SC"])
 def test_a_run_is_the_reference_engines(key):
     row = next(row for row in published.ROWS if row.key == key)
@@ -111,6 +113,7 @@ def idle():
 
 
 class TestFuel:
+    @pytest.mark.weekly
     def test_a_constant_throttle_leaves_no_error(self):
         """The PI of normal mode is an integrator: mu goes to 0."""
         run = nlctl.input_output_response(

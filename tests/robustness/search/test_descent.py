@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from arch_plants import inputs
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -57,7 +58,7 @@ def margin_at(made, change):
     return requirement.function(made.t, *moved, breaks=np.array([]))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=many(40))
 @given(st.integers(0, 10_000), st.sampled_from(range(len(FORMULAS))))
 def test_what_is_said_is_the_margin_there_and_no_random_place_of_the_box_is_far_lower(seed, number):
     rng = np.random.default_rng(seed)

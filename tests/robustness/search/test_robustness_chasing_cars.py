@@ -106,6 +106,7 @@ def test_the_first_seconds_are_those_that_were_published(cars):
     np.testing.assert_array_equal(y[1:, 276], [10, 20, 30, 40])
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("key", FORMULAS)
 def test_the_search_falsifies_what_was_falsified(cars, key):

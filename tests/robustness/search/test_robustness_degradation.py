@@ -35,7 +35,7 @@ def test_the_rates_are_those_of_the_linear_limit_state():
     assert list(table.index) == list(factors)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_the_intervals_cover_as_they_say():
     """80 curves: each interval covers in 80 % or more; all three together if simultaneous."""
     factors, repeats = (0.7, 1.0, 1.5), 80

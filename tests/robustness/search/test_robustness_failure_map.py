@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_row
@@ -91,7 +92,7 @@ def test_the_others_are_nominal_or_given():
     pd.testing.assert_frame_equal(again.table, made.table)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=many(20, part=4))
 @given(st.integers(0, 2**32), st.integers(1, 400))
 def test_it_keeps_to_its_runs(entropy, most):
     """The first grid always runs; margins are those of the rows; NaN counts as failing."""

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -104,7 +105,7 @@ class TestWorstCase:
         assert found.margin == pytest.approx(0.16, abs=1e-3)
 
     @pytest.mark.slow
-    @settings(deadline=None, max_examples=25)
+    @settings(deadline=None, max_examples=many(25, part=4))
     @given(st.integers(1, 4), st.integers(1, 150), st.integers(0, 2**40), st.booleans())
     def test_it_reports_the_least_of_its_own_rows(self, d, runs, entropy, broken):
         """Never more, in no more rows than allowed; the history falls; NaN is the worst."""
@@ -218,7 +219,7 @@ class TestShrink:
         assert made.names == ("arm",)
         assert dict(made.row) == {"x0": 0, "x1": 0, "arm": "b"}
 
-    @settings(deadline=None, max_examples=40)
+    @settings(deadline=None, max_examples=many(40))
     @given(st.integers(0, 2**32), st.integers(1, 6))
     def test_the_result_violates_and_each_part_is_needed(self, entropy, d):
         """Any margin: 1-minimal, within the first row's deviations."""

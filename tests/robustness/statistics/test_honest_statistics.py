@@ -145,6 +145,7 @@ def test_many_tables_are_drawn_or_follow_chi_square(monkeypatch):
     assert independence_test(several, entropy=5) == independence_test(several, entropy=5)
 
 
+@pytest.mark.weekly
 def test_regional_takes_it_for_choices_and_an_exact_one_for_numbers():
     """Small tables without an effect: p below 0.01 in at most one of a hundred, or so."""
     choice = Choice(name="kind", options={"a": 0, "b": 1, "c": 2})

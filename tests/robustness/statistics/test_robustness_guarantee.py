@@ -227,6 +227,7 @@ def ever_lost(p, horizon, leaves_out):
     return lost
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("p", [0.01, 0.1, 0.5])
 def test_the_sequence_fails_rarely_over_all_times(p):
@@ -235,7 +236,7 @@ def test_the_sequence_fails_rarely_over_all_times(p):
     assert 0 < lost <= 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_bounds_for_a_fixed_number_of_runs_must_not_be_watched():
     """Exact bounds, looked at after every run until 150, leave p out far more often."""
 

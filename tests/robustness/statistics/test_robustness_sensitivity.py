@@ -137,7 +137,7 @@ def test_a_linear_function_shares_by_its_variances_whatever_the_laws():
     assert (got.ST["idle"], got.ST_high["idle"]) == (0, 0)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_bootstrap_intervals_cover_and_repeat():
     """Of 40 designs most 90 % intervals hold the known share; one design has one interval."""
     covered = 0
@@ -234,7 +234,7 @@ def test_what_sets_failures_apart_is_found():
     assert by_arm.p_holm["x0"] > 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_p_values_of_idle_quantities_are_uniform():
     """Kolmogorov-Smirnov under the hypothesis: 5 % of p-values are below 0.05."""
     p = []

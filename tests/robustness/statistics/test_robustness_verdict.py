@@ -56,6 +56,7 @@ def test_what_is_needed_is_the_least_number_of_runs(side, n, share, limit):
         assert bound_verdict(statement(k, enough - 1, 0.9, side), limit).answer != "shown"
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize("p", [0.02, 0.1, 0.4])
 @pytest.mark.parametrize("limit", [0.02, 0.1, 0.4])

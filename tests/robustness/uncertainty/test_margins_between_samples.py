@@ -29,6 +29,7 @@ def pulsed(begin, width, height):
     )  # fmt: skip
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 @pytest.mark.parametrize(("begin", "width"), [(3.33, 0.02), (3.3, 0.1), (0.01, 1e-4), (9.8, 1e-6)])
 def test_a_pulse_between_two_samples_has_its_height(begin, width, engine):

@@ -23,6 +23,7 @@ FORMULAS = (
 )
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("text", FORMULAS)
 @given(seed=st.integers(0, 10_000))
 def test_least_of_the_parts(text, seed):

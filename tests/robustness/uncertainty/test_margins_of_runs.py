@@ -86,6 +86,7 @@ CASES = [
 ]
 
 
+@pytest.mark.parted
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "engine"), CASES)
 def test_margins_and_extremes_are_those_of_a_brute_force(name, engine):
@@ -107,6 +108,7 @@ def test_margins_and_extremes_are_those_of_a_brute_force(name, engine):
             assert found == pytest.approx(exact(fine[signal]), abs=1e-6)
 
 
+@pytest.mark.parted
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 def test_a_saturated_signal_of_a_run_has_its_limit_for_its_highest_value(engine):
     signals, breaks = run(ACTUATORS["saturation"], np.linspace(0, END, 101), engine)
