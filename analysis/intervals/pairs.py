@@ -62,6 +62,11 @@ def _fmod(x: arb, y: arb) -> Enclosed:
     return _rest(x, y, lambda q: q.floor() if q >= 0 else q.ceil(), [-abs(y), abs(y)])
 
 
+def _floor_divide(x: arb, y: arb) -> Enclosed:
+    value = (x / y).floor()
+    return value, _ZERO, _ZERO
+
+
 def _rest(x: arb, y: arb, rounded: Callable[[arb], arb], ends: list[arb]) -> Enclosed:
     """Return what division by y leaves of x; between `ends` where several quotients are met."""
     quotient = x / y
@@ -129,6 +134,7 @@ FUNCTIONS_OF_TWO: dict[str, Callable[[arb, arb], Enclosed]] = {
     "arctan2": _arctan2,
     "remainder": _remainder,
     "fmod": _fmod,
+    "floor_divide": _floor_divide,
     "copysign": _copysign,
     "heaviside": _heaviside,
     "logaddexp": _logaddexp,

@@ -12,7 +12,7 @@ from functools import reduce
 from itertools import pairwise
 
 from .edges import domain_edges, have_edges, is_square, poles
-from .graph import ORDERS, Expr, Graph, deduce, needed, parts_first
+from .graph import ORDERS, Expr, Graph, deduce, needed
 from .levels import AtLevel, factors_of_difference, undone
 from .without_poles import as_fraction, compared, multiplied
 
@@ -20,7 +20,8 @@ _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
 _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
 _OF_SECONDS = ("copysign",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
-_OF_QUOTIENTS = ("remainder", "fmod")
+_RESTS = ("remainder", "fmod")
+_OF_QUOTIENTS = (*_RESTS, "floor_divide")
 # functions that jump
 JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
 
@@ -46,7 +47,7 @@ def _switches(node: Expr) -> bool:
     return (
         node.op in _OF_FIRSTS
         or number_rooted(node) is not None
-        or (at_integers(node) and not _is_quotient(node.args[0]))
+        or at_integers(node)
         or (node.op in _OF_SECONDS and node.args[1].varies)
     )
 
@@ -72,29 +73,6 @@ def number_rooted(node: Expr) -> Expr | None:
     """Return what a root is the size of, as sqrt(z z) is that of z; None of any other number."""
     square = node.args[0] if node.op in ("sqrt", "power") else node
     return square.args[0] if square is not node and is_square(square) else None
-
-
-def _is_quotient(number: Expr) -> bool:
-    """Return whether a number is (a - fmod(a, b)) / b or one less: an integer but for rounding."""
-    return all(_moved(node) or _is_divided(node) for node in parts_first([number], _moved))
-
-
-def _moved(node: Expr) -> tuple[Expr, ...]:
-    """Return of which numbers a number is one, or one less."""
-    if node.op == "select":
-        return node.args[1:]
-    return node.args[:1] if node.op == "sub" and node.args[1].op == "const" else ()
-
-
-def _is_divided(node: Expr) -> bool:
-    """Return whether a number is (a - fmod(a, b)) / b."""
-    difference = node.args[0] if node.op == "div" else node
-    if difference.op != "sub" or difference.args[1].op != "fmod":
-        return False
-    (a, rest), divisor = difference.args, node.args[1] if node.op == "div" else None
-    if divisor is None:  # by 1
-        return rest.args[0] is a and rest.args[1].op == "const" and rest.args[1].data == 1
-    return rest.args == (a, divisor)
 
 
 def _is_of_infinity(node: Expr) -> bool:
@@ -154,9 +132,9 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
 
 
 def zigzag(graph: Graph, condition: Expr) -> Expr | None:
-    """Return how far from an integer what `floor` counts is; None of what counts nothing."""
+    """Return how far from an integer what `floor` or `%` counts is; None of what counts nothing."""
     # Positive above an even one and below an odd one: it is continuous between integers.
-    if condition.op not in _OF_INTEGERS:
+    if not at_integers(condition):
         return None
     counted = _counted(graph, condition)
     nearest = graph.op("rint", counted)
@@ -164,13 +142,33 @@ def zigzag(graph: Graph, condition: Expr) -> Expr | None:
 
 
 def of_zigzag(graph: Graph, condition: Expr) -> tuple[Expr, Expr]:
-    """Return what `floor` is next to an integer where its zigzag is negative, and positive."""
+    """Return what `floor` or `%` is next to an integer where its zigzag is < 0, and > 0."""
     op, nearest = condition.op, graph.op("rint", _counted(graph, condition))
-    middle = 0.5 + _OF_INTEGERS[op]
-    parts = (graph.op("sub", nearest, graph.const(c)) for c in (middle, middle - 1.0))
-    below, above = (graph.op(op, part) for part in parts)
+    if op in _RESTS:
+        below, above = _rests(graph, condition, nearest)
+    else:
+        op = "floor" if op in _OF_QUOTIENTS else op
+        middle = 0.5 + _OF_INTEGERS[op]
+        parts = (graph.op("sub", nearest, graph.const(c)) for c in (middle, middle - 1.0))
+        below, above = (graph.op(op, part) for part in parts)
     even = graph.op("gt", _sign(graph, nearest), graph.const(0.0))
     return graph.op("select", even, below, above), graph.op("select", even, above, below)
+
+
+def _rests(graph: Graph, rest: Expr, nearest: Expr) -> tuple[Expr, Expr]:
+    """Return what a remainder is below and above an integer quotient: a divisor apart."""
+    # More than half of the divisor is left on one side: a / b may be rounded to the integer itself.
+    op, divisor, zero = graph.op, graph.number(rest.args[1]), graph.const(0.0)
+    half = op("mul", graph.const(0.5), op("absolute", divisor))
+    is_below = op("gt", op("absolute", rest), half)
+    if rest.op == "fmod":  # with the sign of the dividend
+        is_below = op("xor", is_below, op("lt", nearest, zero))
+    below = op("select", is_below, rest, op("add", rest, divisor))
+    above = op("select", is_below, op("sub", rest, divisor), rest)
+    if rest.op == "remainder":
+        return below, above
+    jumps = op("ne", nearest, zero)
+    return op("select", jumps, below, rest), op("select", jumps, above, rest)
 
 
 def is_of_places(condition: Expr) -> bool:

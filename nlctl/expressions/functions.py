@@ -178,6 +178,8 @@ _ROWS = (
     _row("remainder", "own", r"{0} \bmod {1}",
          lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-",
          series=lambda x, y: x - y * np.floor(x / y)),
+    _row("floor_divide", "own", r"\left\lfloor \frac{{{0}}}{{{1}}} \right\rfloor",
+         _zero, lambda x, y: 0.0 * y, math="-", series="steady"),
     _row("fmod", "fmod", r"\operatorname{{fmod}}\left({0}, {1}\right)",
          lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.trunc(x / y),
          series=lambda x, y: x - y * np.trunc(x / y)),

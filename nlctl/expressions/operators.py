@@ -5,7 +5,6 @@ These are the operators and methods of `Tracer`.
 
 from __future__ import annotations
 
-import functools
 import math
 import operator
 import sys
@@ -290,24 +289,13 @@ def _floor_division_by(self: Tracer, other: object) -> Any:
 
 
 def floor_quotient(graph: Graph, a: object, b: object) -> Tracer:
-    """Return NumPy's floor_divide of floats, which starts from the exact remainder."""
+    """Return NumPy's floor_divide."""
     both = [traced(graph, v) for v in (a, b)]
     are_integers = all(e.kind == "i" for array in both for e in array.values.flat)
     if are_integers and not all(e.op == "const" and e.data for e in both[1].values.flat):
         raise Untraceable("floor division by an integer that depends on the state")
-    op = functools.partial(elementwise, graph)
-    rest = op("fmod", a, b)
-    quotient = op("div", op("sub", a, rest), b)
-    down = op("lt", rest, 0.0)
-    if not (isinstance(b, int | float) and b > 0):
-        down = op("and", op("ne", rest, 0.0), op("xor", op("lt", b, 0.0), down))
-    quotient = op("select", down, op("sub", quotient, 1.0), quotient)
-    whole = op("floor", quotient)
-    up = op("gt", op("sub", quotient, whole), 0.5)
-    whole = op("select", up, op("add", whole, 1.0), whole)
-    if are_integers:
-        return mapped_cells(whole, graph.integer)
-    return op("select", op("eq", b, 0.0), op("div", a, b), whole)
+    quotient = elementwise(graph, "floor_divide", a, b)
+    return mapped_cells(quotient, graph.integer) if are_integers else quotient
 
 
 def mapped_cells(array: Tracer, function: Callable[[Expr], Expr]) -> Tracer:

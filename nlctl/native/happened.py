@@ -23,6 +23,7 @@ _AROUND = 1e-13  # of a time: where it is looked at before and behind a switch
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
     "absolute": "abs", "minimum": "minimum", "maximum": "maximum", "remainder": "%",
+    "floor_divide": "//",
 }  # fmt: skip
 
 

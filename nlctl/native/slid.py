@@ -43,6 +43,7 @@ from .results import Trajectory
 
 Slides = list[tuple["Slide", float]]  # each with how far its function is from 0 at rest
 
+_STEPS = 0.0, 1.0  # instead of sides of what counts: these are of no one integer
 _MOST = 24  # runs again
 _NUMBERS = 256  # elements of an array that slide one by one
 _AROUND = 64  # points
@@ -170,7 +171,11 @@ class _Around:
         (s,) = self.values([function])
         others = [others_of(self.graph, node, functions) for node in changing]
         ways = [np.ones(1) if e is None else self.values([e])[0] for e in others]
-        sides = tuple(side for v, w in zip(values, ways, strict=True) if (side := _sides(v, s, w)))
+        sides = tuple(
+            side
+            for node, v, w in zip(changing, values, ways, strict=True)
+            if (side := _STEPS if zigzag(self.graph, node) and np.ptp(v) else _sides(v, s, w))
+        )
         if len(sides) < len(values) or (step is not None and np.abs(s).max() > _NEAR):
             return None
         pairs = {

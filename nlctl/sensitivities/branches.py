@@ -59,10 +59,10 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
     numbers = [graph.number(arg) for arg in args]
     if op in _ORDERS:
         return _of_order(graph, op, numbers, kept)
-    if op in _WHOLE:
-        (z,) = numbers
-        now = graph.op(op, z)
-        return _side_of(graph, now, _beyond(graph, op, z), [z], _within(graph, op, z, kept), kept)
+    if op in _WHOLE or op == "floor_divide":
+        z, rounding = (graph.op("div", *numbers), "floor") if len(numbers) > 1 else (*numbers, op)
+        level, margin = _beyond(graph, rounding, z), _within(graph, rounding, z, kept)
+        return _side_of(graph, graph.op(op, *numbers), level, [z], margin, kept)
     if op in _QUOTIENTS:
         over, under = numbers
         z, rounding = graph.op("div", over, under), _QUOTIENTS[op]

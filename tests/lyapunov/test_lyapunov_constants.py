@@ -150,7 +150,7 @@ def test_every_constant_tells_where_it_comes_from():
         c["delta"]
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_what_could_not_be_bounded_is_not_called_proved():
     """A gain that grows with v has no sector over all v."""
     plant = nlctl.PureFeedback(order=2, f=hardening)

@@ -197,6 +197,7 @@ def test_the_angle_jumps_at_its_cut():
     assert "no step is found beyond 3.14159 s" in beyond.reason
 
 
+@pytest.mark.weekly
 def test_bounds_in_words_are_not_tighter_than_what_is_proved():
     """1/e has more digits than six: the limit is said as it is, and no share is rounded to all."""
     low = float(np.exp(-1)) * (1 - 1e-4)

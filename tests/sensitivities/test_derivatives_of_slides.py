@@ -61,11 +61,18 @@ def test_two_masses_with_friction_have_the_slopes_of_differences():
         assert by.derivatives[:, j] == pytest.approx((ends[1] - ends[0]) / (2 * h), abs=2e-5)
 
 
-def test_levels_that_are_passed_and_one_along_which_it_slides():
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [
+        ("floor", lambda x: np.floor(2 * x) / 2), ("//", lambda x: x // 0.5 / 2),
+        ("%", lambda x: x - x % 0.5),
+    ],
+)  # fmt: skip
+def test_levels_that_are_passed_and_one_along_which_it_slides(name, steps):
     """x' = a - y, z' = y with y = floor(2 x) / 2: it passes 1/2, and stays at 1 with y = a."""
 
     def update(t, x, u, params):
-        y = np.floor(2 * x[0]) / 2
+        y = steps(x[0])
         return [params["a"] - y, y]
 
     a = 0.8
@@ -81,7 +88,7 @@ def test_levels_that_are_passed_and_one_along_which_it_slides():
     z = np.where(between, -0.5 * later[0], 0.0)
     z = np.where(slides, 0.5 * (later[1] - later[0]) + times - second - a * later[1], z)
     assert by.derivatives[:, 0] == pytest.approx(np.array([x, z]), abs=1e-7)
-    assert by.statistics.slides == ("floor of block 'loop'",)
+    assert by.statistics.slides == (f"{name} of block 'loop'",)
 
 
 def test_masses_whose_friction_forces_are_not_all_determined():

@@ -192,7 +192,7 @@ def test_using_an_object_does_not_change_its_key(name):
     assert loop_facts(loop) == before
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_keys_are_the_same_in_another_process():
     """Addresses and hash seeds are no part of them."""
     script = textwrap.dedent("""

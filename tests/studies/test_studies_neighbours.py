@@ -79,7 +79,7 @@ def write_alone(folder):
     return write(folder / "alone", HEAD, SMALL)
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 @pytest.mark.parametrize("executor", parted(["processes", "threads"]))
 def test_in_processes_of_its_own(tmp_path, executor):
     """On the command line, and in worker processes, which cannot import a neighbour."""

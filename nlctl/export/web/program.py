@@ -183,7 +183,8 @@ HOST_FUNCTIONS = (
 )  # fmt: skip
 
 
-_STEADY = ("floor", "ceil", "trunc", "rint", "sign", "heaviside")  # they are their own levels
+# they are their own levels
+_STEADY = ("floor", "ceil", "trunc", "rint", "floor_divide", "sign", "heaviside")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ from collections.abc import Collection, Mapping, Sequence
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
 from .plan import Store
 
-_JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod", "copysign")
+_JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod",
+          "floor_divide", "copysign")  # fmt: skip
 ALGEBRAIC = ("add", "sub", "mul", "div", "neg", "select", "absolute", "minimum", "maximum")
 _PARTS = ("item", "slice", "concat")  # they compute nothing
 _LOG2_E = 1.4426950408889634

@@ -265,6 +265,7 @@ JUMP_RULES: dict[str, Callable[..., _Result]] = {
     "arctan2": _arctan2,
     "remainder": _rest("floor"),
     "fmod": _rest("trunc"),
+    "floor_divide": lambda b, x, y: _steps(b, arithmetic.div(b, x, y), "floor"),
     "copysign": _copysign,
     "heaviside": _heaviside,
 }

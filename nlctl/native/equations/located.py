@@ -427,5 +427,5 @@ def _frequency(graph: Graph, node: Expr) -> tuple[Expr, ...] | None:
 _PRODUCTS = (
     *("mul", "add", "sub", "neg", "select", "item", "slice", "concat", "sum"),
     *("minimum", "maximum", "absolute", "sign", "floor", "ceil", "trunc", "rint"),
-    *("remainder", "fmod", "heaviside", "copysign"),
+    *("remainder", "fmod", "floor_divide", "heaviside", "copysign"),
 )

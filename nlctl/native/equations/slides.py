@@ -34,7 +34,8 @@ from .relays import array_of, kept_of, limits_of, relay_places
 _Results = dict[str, list[tuple[int, Tracer]]]
 Pairs = Mapping[Expr, tuple[Expr, Expr]]  # of comparisons what they are below, and above
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
-_JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", "floor", "ceil", "trunc", "rint")
+_JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", "floor", "ceil", "trunc", "rint",
+            "remainder", "fmod", "floor_divide")  # fmt: skip
 _BLENDED = ("dx", "g", "y")
 _SUMS = ("add", "sub", "neg", "sum", "concat", "item", "slice")  # linear in all that they are of
 _SEVERAL = 8  # conditions on which one number may depend otherwise: it has 2^8 sides

@@ -89,8 +89,8 @@ def _plain(argument: Any) -> Any:
 
 ROUNDINGS = 24  # ways of rounding that are tried; the first is none
 _EXACT = {"leaf", "item", "slice", "concat", "select", "neg", "absolute", "sign", "copysign",
-          "minimum", "maximum", "floor", "ceil", "trunc", "rint", "lu", "lu_regular",
-          *COMPARISONS, *LOGIC}  # fmt: skip
+          "minimum", "maximum", "floor", "ceil", "trunc", "rint", "floor_divide", "lu",
+          "lu_regular", *COMPARISONS, *LOGIC}  # fmt: skip
 Functions = Mapping[str, Callable[[np.ndarray], np.ndarray]]
 
 

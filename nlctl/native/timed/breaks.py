@@ -20,7 +20,8 @@ _MOST = 2_000_000
 _UNSEEN = 1e-3  # of a run: in what is shorter more switches do not count
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 
-_COUNTING, _PERIODIC = ("floor", "ceil", "trunc", "rint"), ("remainder", "fmod")
+_COUNTING = ("floor", "ceil", "trunc", "rint", "floor_divide")
+_PERIODIC = ("remainder", "fmod", "floor_divide")  # by a quotient
 _INSIDE = (0.382, 0.73)  # parts of a cell: where it is looked at
 _STRAIGHT, _COUNTED = 0.1, 0.25  # of values, and of what counts: how far they may be from a line
 _FINEST = 1e-13  # of the times: no cell is cut that is shorter
@@ -192,7 +193,7 @@ def _compared(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndar
     """Return what an element of a condition compares with 0, or counts, as far as that is known."""
     op, args, element = condition.op, condition.args, partial(_element, k, t)
     with np.errstate(all="ignore"):
-        if op in ("abs", "sign", "heaviside", *_COUNTING):
+        if op in ("abs", "sign", "heaviside", *_COUNTING) and op not in _PERIODIC:
             return element(values([args[0]], t)[0]) * 1.0 - 0.5 * (op == "rint")
         if op == "copysign":
             return element(values([args[1]], t)[0]) * 1.0

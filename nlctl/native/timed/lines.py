@@ -97,7 +97,7 @@ def switches(node: Expr, found: Mapping[Expr, Lines]) -> np.ndarray:
         return args[0].integers(0.0)
     if node.op == "rint":
         return args[0].integers(0.5)
-    if node.op in ("remainder", "fmod"):
+    if node.op in ("remainder", "fmod", "floor_divide"):
         return _divide(*_same(*args)).integers(0.0)
     if node.op in ("lt", "le", "gt", "ge", "eq", "ne", "minimum", "maximum"):
         a, b = _same(*args)
@@ -214,6 +214,7 @@ def _rest(op: str, parts: list[Lines], middle: list[np.ndarray], half: object) -
 _ON_PIECES: dict[str, Callable[..., Lines]] = {
     **dict.fromkeys(("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "xor", "not"), _constant),
     **dict.fromkeys(("floor", "ceil", "trunc", "rint", "sign", "heaviside"), _constant),
+    "floor_divide": _constant,
     **dict.fromkeys(("select", "absolute", "minimum", "maximum"), _chosen),
     **dict.fromkeys(("remainder", "fmod"), _rest),
 }

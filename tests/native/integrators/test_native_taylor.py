@@ -56,6 +56,7 @@ SERIES = {  # each function of the table, of power series
     "rint": lambda x: 0 * x,
     "remainder": lambda x, y: x,  # 0.4 % 0.9
     "fmod": lambda x, y: x,
+    "floor_divide": lambda x, y: 0 * x,
     "minimum": lambda x, y: x,
     "maximum": lambda x, y: y,
     "arctan2": lambda y, x: (y / x).atan(),
@@ -169,7 +170,7 @@ def test_coefficients_of_vectors_are_those_of_their_elements():
     assert found == pytest.approx(np.array(wanted), rel=1e-9, abs=1e-9)
 
 
-INTEGERS = {"floor", "ceil", "trunc", "rint", "remainder", "fmod"}
+INTEGERS = {"floor", "ceil", "trunc", "rint", "remainder", "fmod", "floor_divide"}
 
 
 def located(compiled):

@@ -89,6 +89,7 @@ def test_a_wrong_address_is_one_sentence_and_leaves_nothing(address, words, tmp_
     assert {*tmp_path.iterdir()} - {tmp_path / "__pycache__"} == before
 
 
+@pytest.mark.weekly
 def test_without_the_extra_the_message_says_what_to_install(tmp_path):
     """As where distributed is not installed."""
     code = (

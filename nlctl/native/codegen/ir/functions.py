@@ -241,6 +241,20 @@ def _remainder(b: Body, x: Value, y: Value) -> Value:
     return b.select(b.compare("oeq", rest, 0.0), b.intrinsic("copysign", 0.0, y), rest)
 
 
+def _floor_divide(b: Body, x: Value, y: Value) -> Value:
+    """NumPy's, from the exact remainder: right where x / y is rounded to an integer."""
+    x, y = b.same(x, y)
+    rest = b.each("fmod", x, y)
+    quotient = b.op("fdiv", b.sub(x, rest, exact=True), y, exact=True)
+    signs = b.logic("xor", b.compare("olt", y, 0.0), b.compare("olt", rest, 0.0))
+    down = b.logic("and", b.compare("one", rest, 0.0), signs)
+    quotient = b.select(down, b.sub(quotient, 1.0, exact=True), quotient)
+    whole = b.intrinsic("floor", quotient)
+    up = b.compare("ogt", b.sub(quotient, whole, exact=True), 0.5)
+    whole = b.select(up, b.add(whole, 1.0, exact=True), whole)
+    return b.select(b.compare("oeq", y, 0.0), b.op("fdiv", x, y, exact=True), whole)
+
+
 def _logaddexp(b: Body, x: Value, y: Value) -> Value:
     """max(x, y) + ln(1 + e^-|x - y|), which neither overflows nor asks for inf - inf."""
     x, y = b.same(x, y)
@@ -258,4 +272,5 @@ INLINE = {
     "sign": _sign,
     "heaviside": _heaviside,
     "remainder": _remainder,
+    "floor_divide": _floor_divide,
 }
