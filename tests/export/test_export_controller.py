@@ -127,7 +127,8 @@ def every_function(t, x, u, params):
     a, b = u
     return np.array([
         np.exp(a), np.exp2(a), np.tanh(a), np.sin(a), np.cos(a), np.minimum(a, b), np.maximum(a, b),
-        np.logaddexp(a, b), np.sign(a), np.heaviside(a, b), np.remainder(a, b), np.sqrt(a),
+        np.logaddexp(a, b), np.sign(a), np.heaviside(a, b), np.remainder(a, b),
+        np.floor_divide(a, b), np.sqrt(a),
         np.absolute(a), np.floor(a), np.copysign(a, b), np.ceil(a), np.trunc(a), np.rint(a),
     ])  # fmt: skip
 
