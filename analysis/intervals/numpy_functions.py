@@ -58,7 +58,7 @@ class NumPyFunctions:
     __eq__, __ne__ = calling("_compared", "eq"), calling("_compared", "ne")
     __floor__, __ceil__ = calling("apply", "floor"), calling("apply", "ceil")
     __trunc__ = calling("apply", "trunc")
-    __mod__ = calling("pair", "remainder")
+    __mod__, __floordiv__ = calling("pair", "remainder"), calling("pair", "floor_divide")
 
     def __pos__(self) -> Any:
         return self
@@ -104,11 +104,8 @@ class NumPyFunctions:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
 
-    def __floordiv__(self, other: object) -> Any:
-        return (self / other).apply("floor")  # type: ignore[operator]
-
     def __rfloordiv__(self, other: object) -> Any:
-        return (other / self).apply("floor")
+        return self.lifted(other).pair("floor_divide", self)
 
     def __divmod__(self, other: object) -> Any:
         return self // other, self % other

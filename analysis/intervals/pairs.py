@@ -64,7 +64,8 @@ def _fmod(x: arb, y: arb) -> Enclosed:
 
 def _floor_divide(x: arb, y: arb) -> Enclosed:
     value = (x / y).floor()
-    return value, _ZERO, _ZERO
+    slope = _ZERO if value.is_exact() else _ANY  # between integers it is one number
+    return value, slope, slope
 
 
 def _rest(x: arb, y: arb, rounded: Callable[[arb], arb], ends: list[arb]) -> Enclosed:

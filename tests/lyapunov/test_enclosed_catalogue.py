@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 from examples import crossed, many
+from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
+from nlctl.analysis.intervals.pairs import FUNCTIONS_OF_TWO
 from nlctl.analysis.lyapunov import Box, certify, enclose, prove_decrease
 from nlctl.errors import ParameterError
+from nlctl.expressions.conditions import JUMPING
+from nlctl.expressions.functions import FUNCTIONS as TABLE
 
 FUNCTIONS = {
     "sign": lambda x, y: np.sign(x) + 0.5 * np.sign(y - 1),
@@ -184,3 +188,17 @@ def test_what_is_not_decided_says_what_is_missing():
     assert found.status == "undecided"
     assert "max_boxes" in found.missing
     assert str(found) == f"undecided: {found.missing}"
+
+
+ACROSS = {  # enclosures that hold a jump
+    "remainder": (arb(1, 0.25), arb(1)), "fmod": (arb(1, 0.25), arb(1)),
+    "floor_divide": (arb(1, 0.25), arb(1)), "heaviside": (arb(0, 0.5), arb(0.5)),
+    "copysign": (arb(1), arb(0, 0.5)), "arctan2": (arb(0, 0.5), arb(-1)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name in JUMPING if TABLE[name].count == 2])
+def test_across_a_jump_no_derivative_of_two_numbers_is_bounded(name):
+    """A centred form with a slope of 0 there would leave out one of the sides."""
+    _, *slopes = FUNCTIONS_OF_TWO[name](*ACROSS[name])
+    assert not all(slope.is_finite() for slope in slopes)
