@@ -187,5 +187,7 @@ _ROWS = (
 
 # every function that expressions know, by NumPy's name
 FUNCTIONS = {row.name: row for row in _ROWS}
+# those whose values are integers, one between two jumps
+COUNTING = tuple(row.name for row in _ROWS if row.series == "steady")
 # NumPy's names of the functions of Python's `math`
 MATH = {name: row.name for row in _ROWS for name in row.math}

@@ -163,7 +163,8 @@ class _Around:
         """Return a slide of conditions that change together, if rates jump there as it has them."""
         changing = changing_at(self.graph, self._every, functions)
         values = self.values(changing)
-        steps = {zigzag(self.graph, n) for n, v in zip(changing, values, strict=True) if np.ptp(v)}
+        jumps = [bool(np.ptp(v)) for v in values]
+        steps = {zigzag(self.graph, n) for n, does in zip(changing, jumps, strict=True) if does}
         if len(steps) != 1:  # different ones, or steps and what compares
             return None
         (step,) = steps
@@ -173,8 +174,8 @@ class _Around:
         ways = [np.ones(1) if e is None else self.values([e])[0] for e in others]
         sides = tuple(
             side
-            for node, v, w in zip(changing, values, ways, strict=True)
-            if (side := _STEPS if zigzag(self.graph, node) and np.ptp(v) else _sides(v, s, w))
+            for does, v, w in zip(jumps, values, ways, strict=True)
+            if (side := _STEPS if step and does else _sides(v, s, w))
         )
         if len(sides) < len(values) or (step is not None and np.abs(s).max() > _NEAR):
             return None
@@ -281,10 +282,10 @@ class SlidRun:
     def named(self, reached: Trajectory) -> Trajectory:
         """Return a run that says along what it has slid, and when several ways led away."""
         nodes, log = self.compiled.schedule.nodes, self.reached.happened
-        slides, forks = list[str](), set[float]()
+        noted, slides, forks = log.label // 2, list[str](), set[float]()
         places, rows = slide_places(nodes), slide_rows(self.compiled)
         for (slide, _), i, (_, *ends) in zip(self.slides, places, rows, strict=True):
-            below, above = (set(log.time[log.label // 2 == row].tolist()) for row in ends)
+            below, above = (set(log.time[noted == row].tolist()) for row in ends)
             modes = self.reached.states[nodes[i].state_offset, 1:]
             if below or above or np.any(np.abs(modes) < 0.5):
                 slides.append(slide.name)

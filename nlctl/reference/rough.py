@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-__all__ = ["MOST_STEPS", "ROUGH", "next_to", "rough_state"]
+__all__ = ["MOST_STEPS", "ROUGH", "neighbours", "next_to", "rough_state"]
 
 MOST_STEPS = 1e6  # to come at the pace so far: with less of them a run ends anyway
 ROUGH = (
@@ -28,11 +28,16 @@ def next_to(x: np.ndarray, ways: float = _WAYS[1]) -> np.ndarray:
     return x + ways * np.spacing(x)
 
 
+def neighbours(x: np.ndarray) -> list[np.ndarray]:
+    """Return a state and states that are as good as the same."""
+    return [next_to(x, way) for way in _WAYS]
+
+
 def _noise(rates: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
     """Return by how much rates change with the rounding of states, 0 where they hardly do."""
     # Large rates have large last digits: those of a run that diverges are no noise.
-    here = rates(x)
-    noise = np.max([np.abs(rates(next_to(x, way)) - here) for way in _WAYS], axis=0)
+    here, *others = map(rates, neighbours(x))
+    noise = np.max([np.abs(other - here) for other in others], axis=0)
     return np.where(noise > _HARDLY * np.abs(here), noise, 0.0 * noise)
 
 

@@ -18,6 +18,7 @@ from ... import native
 from ...annotations import as_annotated
 from ...attributes import described_record
 from ...errors import CompileError, ParameterError
+from ...expressions.functions import COUNTING
 from ...expressions.graph import Expr, Graph
 from ...native.codegen.ir.program import program_text
 from ...native.codegen.plan import Store, split
@@ -183,8 +184,7 @@ HOST_FUNCTIONS = (
 )  # fmt: skip
 
 
-# they are their own levels
-_STEADY = ("floor", "ceil", "trunc", "rint", "floor_divide", "sign", "heaviside")
+_STEADY = (*COUNTING, "sign", "heaviside")  # they are their own levels
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from ...reference.rough import MOST_STEPS, next_to, rough_state
+from ...reference.rough import MOST_STEPS, neighbours, next_to, rough_state
 from ..integrate.state import METHOD, RUNNING
 from ..integrate.workspace import Task, Work
 from .accumulation import accumulated, accumulating
@@ -135,7 +135,7 @@ def _roughness(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | None
 
 def _is_at_condition(evaluated: LaneEquations, t: float, x: np.ndarray, u: np.ndarray) -> bool:
     """Whether a condition is within rounding of a state: a step has just ended behind it."""
-    signs = [np.sign(evaluated.switching(t, z, u)) for z in (next_to(x, -4.0), x, next_to(x, 4.0))]
+    signs = [np.sign(evaluated.switching(t, z, u)) for z in neighbours(x)]
     return any(not np.array_equal(one, signs[0]) for one in signs)
 
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 
+from ...expressions.functions import COUNTING
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
 from .plan import Store
 
-_JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod",
-          "floor_divide", "copysign")  # fmt: skip
+_JUMPS = (*COMPARISONS, *COUNTING, "sign", "remainder", "fmod", "copysign")
 ALGEBRAIC = ("add", "sub", "mul", "div", "neg", "select", "absolute", "minimum", "maximum")
 _PARTS = ("item", "slice", "concat")  # they compute nothing
 _LOG2_E = 1.4426950408889634

@@ -20,6 +20,7 @@ from ...expressions.conditions import (
 from ...expressions.dependence import affine, reads
 from ...expressions.derivatives import tangents
 from ...expressions.edges import have_edges
+from ...expressions.functions import COUNTING
 from ...expressions.graph import ORDERS, Expr, Graph, deduce, needed
 from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
@@ -426,6 +427,6 @@ def _frequency(graph: Graph, node: Expr) -> tuple[Expr, ...] | None:
 
 _PRODUCTS = (
     *("mul", "add", "sub", "neg", "select", "item", "slice", "concat", "sum"),
-    *("minimum", "maximum", "absolute", "sign", "floor", "ceil", "trunc", "rint"),
-    *("remainder", "fmod", "floor_divide", "heaviside", "copysign"),
+    *("minimum", "maximum", "absolute", "sign", *COUNTING),
+    *("remainder", "fmod", "heaviside", "copysign"),
 )

@@ -21,6 +21,7 @@ import numpy as np
 from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array
 from ...expressions.conditions import of_zigzag, switching_functions, zigzag
+from ...expressions.functions import COUNTING
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
 from ...wording import counted
 from ..diagram.nodes import Slide
@@ -34,8 +35,7 @@ from .relays import array_of, kept_of, limits_of, relay_places
 _Results = dict[str, list[tuple[int, Tracer]]]
 Pairs = Mapping[Expr, tuple[Expr, Expr]]  # of comparisons what they are below, and above
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
-_JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", "floor", "ceil", "trunc", "rint",
-            "remainder", "fmod", "floor_divide")  # fmt: skip
+_JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", *COUNTING, "remainder", "fmod")
 _BLENDED = ("dx", "g", "y")
 _SUMS = ("add", "sub", "neg", "sum", "concat", "item", "slice")  # linear in all that they are of
 _SEVERAL = 8  # conditions on which one number may depend otherwise: it has 2^8 sides

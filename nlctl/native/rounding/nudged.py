@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...expressions.evaluate import value_of
+from ...expressions.functions import COUNTING
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
 
 _PLACES = 16  # units in the last place by which an operation is nudged; libraries differ by four
@@ -89,8 +90,8 @@ def _plain(argument: Any) -> Any:
 
 ROUNDINGS = 24  # ways of rounding that are tried; the first is none
 _EXACT = {"leaf", "item", "slice", "concat", "select", "neg", "absolute", "sign", "copysign",
-          "minimum", "maximum", "floor", "ceil", "trunc", "rint", "floor_divide", "lu",
-          "lu_regular", *COMPARISONS, *LOGIC}  # fmt: skip
+          "minimum", "maximum", *COUNTING, "lu", "lu_regular",
+          *COMPARISONS, *LOGIC}  # fmt: skip
 Functions = Mapping[str, Callable[[np.ndarray], np.ndarray]]
 
 

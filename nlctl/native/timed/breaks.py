@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import ChatteringError
 from ...expressions.evaluate import evaluate_expressions
+from ...expressions.functions import COUNTING
 from ...expressions.graph import ORDERS, Expr, needed
 from ..codegen.rewrite import computed_as_written
 from ..rounding.nudged import nudged_columns
@@ -20,7 +21,6 @@ _MOST = 2_000_000
 _UNSEEN = 1e-3  # of a run: in what is shorter more switches do not count
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 
-_COUNTING = ("floor", "ceil", "trunc", "rint", "floor_divide")
 _PERIODIC = ("remainder", "fmod", "floor_divide")  # by a quotient
 _INSIDE = (0.382, 0.73)  # parts of a cell: where it is looked at
 _STRAIGHT, _COUNTED = 0.1, 0.25  # of values, and of what counts: how far they may be from a line
@@ -30,7 +30,7 @@ _SAME = 1e-12  # of the times: places that are one
 _ROUNDINGS = 8  # ways of rounding in which a condition must agree on either side of its switch
 _WIDER = 4.0
 _AT_POINTS = ("eq", "ne")  # these differ at points alone, or from where something else switches
-_CHOOSING = (*ORDERS, *_COUNTING, "sign", "heaviside")  # constant from one switch to the next
+_CHOOSING = (*ORDERS, *COUNTING, "sign", "heaviside")  # constant from one switch to the next
 
 Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 # of times: one integer between two switches and another one behind
@@ -171,7 +171,7 @@ def _level(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndarray
     """Return the indicator of an element."""
     op, args, element = condition.op, condition.args, partial(_element, k, t)
     with np.errstate(all="ignore"):
-        if condition.kind == "b" or op in (*_COUNTING, "sign", "heaviside"):
+        if condition.kind == "b" or op in (*COUNTING, "sign", "heaviside"):
             return element(values([condition], t)[0]).astype(float)
         if op in _PERIODIC:
             rest, by = map(element, values([condition, args[1]], t))
@@ -193,7 +193,7 @@ def _compared(condition: Expr, k: int, values: Values, t: np.ndarray) -> np.ndar
     """Return what an element of a condition compares with 0, or counts, as far as that is known."""
     op, args, element = condition.op, condition.args, partial(_element, k, t)
     with np.errstate(all="ignore"):
-        if op in ("abs", "sign", "heaviside", *_COUNTING) and op not in _PERIODIC:
+        if op in ("abs", "sign", "heaviside", *COUNTING) and op not in _PERIODIC:
             return element(values([args[0]], t)[0]) * 1.0 - 0.5 * (op == "rint")
         if op == "copysign":
             return element(values([args[1]], t)[0]) * 1.0
@@ -301,7 +301,7 @@ def _searched(
 ) -> np.ndarray:
     """Return where an element of a condition changes."""
     compared = partial(_compared, condition, k, values)
-    return _sought(indicator, compared, *where, condition.op in (*_COUNTING, *_PERIODIC))
+    return _sought(indicator, compared, *where, condition.op in (*COUNTING, *_PERIODIC))
 
 
 def _sought(

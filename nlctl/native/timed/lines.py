@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...expressions.functions import COUNTING
 from ...expressions.graph import Expr, needed, numpy_function
 
 _MOST = 1_000_000  # pieces
@@ -213,8 +214,7 @@ def _rest(op: str, parts: list[Lines], middle: list[np.ndarray], half: object) -
 
 _ON_PIECES: dict[str, Callable[..., Lines]] = {
     **dict.fromkeys(("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "xor", "not"), _constant),
-    **dict.fromkeys(("floor", "ceil", "trunc", "rint", "sign", "heaviside"), _constant),
-    "floor_divide": _constant,
+    **dict.fromkeys((*COUNTING, "sign", "heaviside"), _constant),
     **dict.fromkeys(("select", "absolute", "minimum", "maximum"), _chosen),
     **dict.fromkeys(("remainder", "fmod"), _rest),
 }
