@@ -69,7 +69,7 @@ def pytest_collection_modifyitems(items):
 
 
 def part_rows(items):
-    """Count as weekly all but every third row of a test with the mark ``parted``.
+    """Count as weekly all but every third row of a test with the mark ``parted``, or ``part=n``-th.
 
     Of combinations, those of each day have every value of each table.
     """
@@ -80,7 +80,8 @@ def part_rows(items):
     for rows in tests.values():
         places = [places_in(table, rows) for table in tables_of(rows[0])]
         lengths = sorted(len(set(column)) for column in places)
-        part = min(3, lengths[-2] if len(lengths) > 1 else lengths[-1])
+        asked = rows[0].get_closest_marker("parted").kwargs.get("part", 3)
+        part = min(asked, lengths[-2] if len(lengths) > 1 else lengths[-1])
         for item, *place in zip(rows, *places, strict=True):
             if sum(place) % part:
                 item.add_marker("weekly")

@@ -5,7 +5,6 @@ from typing import Any
 import control as ct
 import numpy as np
 import pytest
-from examples import parted
 
 import nlctl
 from nlctl.analysis.robustness import Requirement, Space, Spec, Uncertain, always, in_band
@@ -49,7 +48,8 @@ USES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", parted(ATTRIBUTES, part=6))
+@pytest.mark.parted(part=6)
+@pytest.mark.parametrize("name", ATTRIBUTES)
 @pytest.mark.parametrize("use", USES.values(), ids=USES)
 def test_attributes_of_a_users_class_mean_nothing(name, use):
     """Every name that classes of nlctl have, with values that they might have."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from examples import many, parted, some
+from examples import many, some
 
 import nlctl
 from nlctl.native.floats import float_parameters
@@ -48,7 +48,8 @@ def extrapolated(function, at, h):
     return (4 * value(h / 2) - value(h)) / 3
 
 
-@pytest.mark.parametrize("name", parted(EXAMPLES, part=4))
+@pytest.mark.parted(part=4)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_examples(name):
     """Every parameter of plant, actuator and controller, and where the run begins.
 

@@ -5,7 +5,6 @@ import sys
 import pandas as pd
 import pytest
 from command_line import nlctl
-from examples import parted
 from studies_example import HEAD, LOOP, write
 
 from nlctl.analysis.studies import StudyError, read_study, replay, run
@@ -80,7 +79,7 @@ def write_alone(folder):
 
 
 @pytest.mark.weekly
-@pytest.mark.parametrize("executor", parted(["processes", "threads"]))
+@pytest.mark.parametrize("executor", ["processes", "threads"])
 def test_in_processes_of_its_own(tmp_path, executor):
     """On the command line, and in worker processes, which cannot import a neighbour."""
     written(tmp_path, FILES)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import nlctl_here
-from examples import many, parted, some
+from examples import many, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from resealed import reseal, write_chunk
@@ -133,7 +133,8 @@ def edit(path, old, new):
     path.write_bytes(content.replace(old, new))
 
 
-@pytest.mark.parametrize("name", parted(PAGES))
+@pytest.mark.parted
+@pytest.mark.parametrize("name", PAGES)
 def test_an_edited_page_is_named_and_made_again(copied, name):
     """By verify, compare and the gallery; the data are as they were, so that it can be remade."""
     PAGES[name](copied)
@@ -365,7 +366,8 @@ KINDS_ASKED = [line[8:-1] for line in EVERY_KIND.splitlines() if line.startswith
 @pytest.mark.ci
 @settings(max_examples=many(4, part=2))
 @given(data=st.data())
-@pytest.mark.parametrize("kind", parted(KINDS_ASKED))
+@pytest.mark.parted
+@pytest.mark.parametrize("kind", KINDS_ASKED)
 def test_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data):
     """Any table of any kind of analysis, every key right: no trace, no exit 3."""
     any_change_ends_in_a_sentence(run_of(kind), tmp_path_factory.mktemp("any") / "out", data)

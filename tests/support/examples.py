@@ -17,14 +17,6 @@ def some(rows, part=3, first=0):
     return rows if os.environ.get("ALL_EXAMPLES") else rows[first % part :: part]
 
 
-def parted(rows, part=3):
-    """Rows of a parametrized test: every third each day, the others marked weekly."""
-    rows = list(rows)
-    return [
-        pytest.param(r, marks=pytest.mark.weekly) if i % part else r for i, r in enumerate(rows)
-    ]
-
-
 def crossed(*tables):
     """Rows of a test of all combinations: every value each day, the other combinations weekly.
 

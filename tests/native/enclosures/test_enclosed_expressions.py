@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from examples import many, parted
+from examples import many
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -44,7 +44,8 @@ def outside(code, low, high, points):
     return missed, taken
 
 
-@pytest.mark.parametrize("seed", parted(range(6)))
+@pytest.mark.parted
+@pytest.mark.parametrize("seed", range(6))
 def test_no_sample_of_a_random_expression_is_outside(seed):
     """All operations, with poles, jumps, ends of domains, points and sides without an end."""
     rng = np.random.default_rng(seed)

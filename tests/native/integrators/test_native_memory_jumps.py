@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import control as ct
 import numpy as np
 import pytest
-from examples import crossed, many, parted
+from examples import crossed, many
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -129,7 +129,8 @@ def test_behind_a_corner(name, method, heights, end):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", parted(ACTUATORS, part=2))
+@pytest.mark.parted(part=2)
+@pytest.mark.parametrize("name", ACTUATORS)
 @given(gain=st.floats(-3.0, 2.0).filter(lambda a: abs(a) > 0.01), end=st.floats(0.05, 1.6))
 @settings(max_examples=many(10, part=2))
 def test_behind_a_sampled_block(name, gain, end):
@@ -142,7 +143,8 @@ def test_behind_a_sampled_block(name, gain, end):
     assert run.outputs[0, -1] == pytest.approx(wanted, abs=2e-7)
 
 
-@pytest.mark.parametrize("name", parted(ACTUATORS))
+@pytest.mark.parted
+@pytest.mark.parametrize("name", ACTUATORS)
 @given(heights=heights, end=ends)
 @settings(max_examples=many(10, part=2))
 def test_behind_a_delay(name, heights, end):
