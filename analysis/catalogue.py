@@ -3,8 +3,6 @@
 To import the blocks takes seconds, to read their sources does not.
 """
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import functools

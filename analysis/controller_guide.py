@@ -4,8 +4,6 @@ What can be counted or called (signals, states, parameters, the proof) is compar
 controller itself by ``tests/blocks/test_controller_guide.py``; importing this takes no time.
 """
 
-from __future__ import annotations
-
 from nlctl.attributes import described_record
 from nlctl.wording import counted
 

@@ -1,7 +1,5 @@
 """Results as JSON can hold them, and back."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from numbers import Integral, Real

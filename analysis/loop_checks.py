@@ -1,7 +1,5 @@
 """What is checked of a loop that nobody has claimed anything of: its run, and where it comes to."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

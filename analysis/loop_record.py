@@ -6,8 +6,6 @@ any code that is read, python-control's own rates and outputs are evaluated at a
 distinguish two loops where a key cannot, such as that of a function of another language.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

@@ -11,8 +11,6 @@ states do not follow from its equations (`nlctl.analysis.response_of_loop` says 
 study, a ledger or a certificate whose record is of other equations, parameters or wires.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

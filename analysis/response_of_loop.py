@@ -1,7 +1,5 @@
 """Whether a response is one of a loop: outputs are the loop's, and states follow from it."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count

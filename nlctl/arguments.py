@@ -3,8 +3,6 @@
 Every message names who asked, the argument, the rule and the value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, TypeVar
 

@@ -5,8 +5,6 @@ begins with a shape.  Fields without one that have the type of the field before 
 A function that returns such a record, and has no section Returns, has the record's first sentence.
 """
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import functools
@@ -51,7 +49,8 @@ def described_record(cls: Any = None, /, *, made_by: str = "", **options: bool) 
 
 def with_returned(function: Any) -> str | None:
     """Return the docstring of a function, with the section Returns for a described record."""
-    name, text = function.__annotations__.get("return"), inspect.cleandoc(function.__doc__ or "")
+    text, name = inspect.cleandoc(function.__doc__ or ""), function.__annotations__.get("return")
+    name = getattr(name, "__name__", name)  # of a class, or its name
     docstring = vars(function.__globals__.get(name, object)).get("__doc__")
     if not text or not isinstance(docstring, _Docstring) or "Returns\n---" in text:
         return function.__doc__

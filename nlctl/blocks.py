@@ -1,7 +1,5 @@
 """The block contract: a record of parameters and its equations, as a python-control system."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 

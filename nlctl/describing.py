@@ -1,7 +1,5 @@
 """Describing functions by simulation of the block itself, and the limit cycles they predict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakKeyDictionary

@@ -1,7 +1,5 @@
 """Functions that blocks share: Nussbaum functions, Gaussian basis, smooth sign, clip, noise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Every choice that the paper leaves open is an argument; the defaults are the rea
 other statements support.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Literal
 

@@ -3,8 +3,6 @@
 This module and its bounds are the only validators of numbers in nlctl.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import inspect

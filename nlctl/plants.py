@@ -5,8 +5,6 @@ x_n' = f(x, v) + d(x, t)                                                   (1)
 y    = x_1
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import field
 from functools import cached_property

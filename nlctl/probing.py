@@ -1,7 +1,5 @@
 """Equations of a block, called once: what they take and return, and whether inputs act at once."""
 
-from __future__ import annotations
-
 import inspect
 import traceback
 from collections.abc import Mapping, Sequence

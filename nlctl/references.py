@@ -3,8 +3,6 @@
 Each reference of order n outputs yd and its derivatives yd1, ..., ydn (yd', ..., yd^(n)).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import field

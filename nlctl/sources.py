@@ -4,8 +4,6 @@ Each has one output, `ref` unless it is given another name.  What jumps in them 
 both engines solve it before a run, so that no pulse is stepped over.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@ follows from the rates of the whole diagram.  Where such a diagram is evaluated 
 `supplying` says what leaves these blocks, and keeps what arrives at them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar

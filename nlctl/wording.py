@@ -1,7 +1,5 @@
 """How messages are worded: a number agrees with its noun, a wrong name has its nearest."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 from typing import SupportsIndex

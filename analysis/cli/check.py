@@ -1,7 +1,5 @@
 """What `nlctl check` prints, and the initial states of its ensembles."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """``nlctl export``: a controller, all equations of a loop, or an FMU, for other machines."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

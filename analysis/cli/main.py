@@ -1,7 +1,5 @@
 """The command line.  It only reads arguments and prints; everything heavy is imported late."""
 
-from __future__ import annotations
-
 import functools
 import shlex
 import warnings

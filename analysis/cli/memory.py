@@ -1,7 +1,5 @@
 """How a run ends where memory is short: with a message, and neither a trace nor a wait."""
 
-from __future__ import annotations
-
 import errno
 import mmap
 import os

@@ -1,7 +1,5 @@
 """What is printed: text from files and folders may not give orders to the terminal."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

@@ -1,7 +1,5 @@
 """``nlctl new NAME``: a folder with a loop, a study of it and a test, which run as they are."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from string import Template

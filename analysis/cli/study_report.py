@@ -1,7 +1,5 @@
 """The body of ``nlctl report study.toml`` and ``nlctl report RUN``: a study's results as a page."""
 
-from __future__ import annotations
-
 import os
 import shlex
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """What all figures share; names that users give as labels, and numbers of any size, drawn."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar

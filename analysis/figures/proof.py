@@ -1,7 +1,5 @@
 """Figures of the proof: long runs, V and its bounds, margins."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

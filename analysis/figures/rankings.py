@@ -1,7 +1,5 @@
 """Figures that rank quantities and controllers: one line each; and a study over its revisions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

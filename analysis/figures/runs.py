@@ -4,8 +4,6 @@ A run violates the spec unless its margin is > 0: NaN, and margins of runs that 
 end, are drawn as violations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of searches: after how many runs, at which size, under which faults, of which gains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

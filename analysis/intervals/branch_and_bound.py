@@ -12,8 +12,6 @@ What is proved is about the equation with its parameters as doubles; arithmetic 
 floats inside it (``2 * np.pi``) is rounded as in every run.
 """
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import time

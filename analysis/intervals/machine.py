@@ -5,8 +5,6 @@ A function that can be traced is enclosed by floats that are rounded outwards, s
 them at points of the box, and where a claim is refuted they have the last word.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager

@@ -5,8 +5,6 @@ Each kind of number has ``apply(name)`` for the functions of one argument of the
 and ``table(xp, fp)`` for a linear interpolation.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import operator

@@ -5,8 +5,6 @@ it jumps between them the derivatives are without bounds, so that nobody takes i
 where it has a corner they enclose the generalised gradient (Clarke).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 from flint import arb

@@ -1,7 +1,5 @@
 """Comparisons that balls cannot decide: they are refused, or every answer is followed in turn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar

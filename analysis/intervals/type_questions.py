@@ -5,8 +5,6 @@ got may do one thing in a run and another in a proof, at points that no comparis
 its code is read before it is called, with all that it calls, and the question is named.
 """
 
-from __future__ import annotations
-
 import builtins
 import dis
 import functools

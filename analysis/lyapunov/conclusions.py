@@ -9,8 +9,6 @@ less than the true constants, from values that are attained at points of a box, 
 that what they say of all boxes is right.  A box that does close is found with the proved constants.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

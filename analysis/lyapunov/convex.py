@@ -1,7 +1,5 @@
 """Convex programs (Clarabel): quadratic costs, linear limits, and matrices >= 0."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

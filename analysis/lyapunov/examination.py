@@ -1,7 +1,5 @@
 """Runs of a loop and the constants that the proof has for them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

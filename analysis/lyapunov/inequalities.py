@@ -5,8 +5,6 @@ diagram: the rates come from the blocks' own equations, see
 `nlctl.analysis.lyapunov.loop.instrumented`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -19,8 +19,6 @@ by at most h^2 |y''| / 8.
 from both sides, extrapolated from the samples of that side, are values of the signal as well.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from nlctl.equations import equation

@@ -4,8 +4,6 @@
 of the events of a run.  A signal with NaN has the number NaN, or one that is not a finite number.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .curves import limits_at_breaks, turning_points

@@ -1,7 +1,5 @@
 """Integrals of a signal over time, by Simpson's rule on any samples."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .samples import of_samples

@@ -1,7 +1,5 @@
 """Functions of samples: plain Python that machine code calls, too, and that says what is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Named numbers of a response, the usual ones of a tracking loop, and their machine code."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Callable

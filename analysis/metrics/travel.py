@@ -4,8 +4,6 @@ With `breaks`, the times (s) of kinks and jumps, it moves as `curves.path` does:
 them, and at once where it jumps.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .curves import path

@@ -1,7 +1,5 @@
 """Reports compared: two as a page, with signals of both, and one over its revisions."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

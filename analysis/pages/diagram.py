@@ -1,7 +1,5 @@
 """A loop on a page: diagram, parameters, equations as they were run; and one run of it."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 

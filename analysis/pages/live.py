@@ -1,7 +1,5 @@
 """A loop that a page runs itself: its program, its sliders, and what stands behind its curves."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import shlex

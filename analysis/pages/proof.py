@@ -8,8 +8,6 @@ The ledger writes a formula as it is typed on a terminal.  A word is part of a f
 symbol of the paper, a function, or a single letter; numbers and signs next to it belong to it.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections import Counter

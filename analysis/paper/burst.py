@@ -13,8 +13,6 @@ integrator follows it.  From there the loop is carried on in three ways.
    which two values show.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import field

@@ -1,7 +1,5 @@
 """All controllers of an example: the paper's, its ablations, baselines, certified and repaired."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the report's part on the proof is made of: one loop, examined, and runs that are kept."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Figures of the paper's runs: signals over time, and the actuator's characteristic."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

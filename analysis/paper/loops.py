@@ -5,8 +5,6 @@ number.  What is asked of the actuator are parameters of its cascade: ``actuator
 ``actuator.body.c_r``, ``actuator.saturation.limit``, ``actuator.gain.k``.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import control as ct

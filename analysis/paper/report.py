@@ -6,8 +6,6 @@ In a notebook::
     write_report(made.report, Path("reports/paper"))          # of nlctl.analysis.report
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """The closed loops that the reproduction runs, and what a right implementation reaches."""
 
-from __future__ import annotations
-
 import csv
 import math
 from dataclasses import dataclass

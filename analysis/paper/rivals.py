@@ -5,8 +5,6 @@ controllers on fresh samples behind one actuator after the other; ``campaign/riv
 the gains.
 """
 
-from __future__ import annotations
-
 import csv
 import functools
 import json

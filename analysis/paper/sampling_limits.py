@@ -5,8 +5,6 @@ time, the delay and the steps of both converters; ``python campaign/sampling_run
 checkout, makes it again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Canudas de Wit et al. 1995, the LuGre model: its figures against a reconstruction of them."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Chowdhary and Johnson 2010, their uncertain pendulum: what the author's program shows."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

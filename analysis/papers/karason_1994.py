@@ -1,7 +1,5 @@
 """Karason and Annaswamy 1994, its scalar example: what a program for it shows, and what holds."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

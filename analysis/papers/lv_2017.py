@@ -1,7 +1,5 @@
 """Lv et al. 2017, with its proof and its studies."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from ..paper.page.record import LV_2017

@@ -1,7 +1,5 @@
 """Tabuada 2007, its linear example: what is quoted of it, and what of that holds."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

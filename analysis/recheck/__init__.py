@@ -10,8 +10,6 @@ What is taken from the file as a premise, and is for its reader to compare with 
 printed: the kind of controller, the equation, the split v = k u + eps_u, the reference.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence

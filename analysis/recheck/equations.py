@@ -1,7 +1,5 @@
 """Equations of the file, on boxes: values, slopes, and bounds that are proved by halving."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction

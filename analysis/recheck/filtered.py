@@ -1,7 +1,5 @@
 """Loops with a filtered error r: known sign, and sliding mode."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction

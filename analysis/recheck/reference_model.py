@@ -7,8 +7,6 @@ As long as V < C all signals are in a box, on which |rest|, and so |delta|, is b
 reach C with that bound, it never does.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction

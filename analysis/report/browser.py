@@ -1,7 +1,5 @@
 """What an installed browser does for reports: show them, and print them to PDF."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

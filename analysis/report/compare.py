@@ -1,7 +1,5 @@
 """What differs between two reports: verdict, claims, numbers, tables."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

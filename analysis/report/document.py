@@ -6,8 +6,6 @@ A report is data until the last step; `nlctl.analysis.report.render` turns it in
 ``report.json``, so that every number on the page is also in the file next to it.
 """
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

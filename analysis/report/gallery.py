@@ -1,7 +1,5 @@
 """An index page over several reports."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Interactive time histories: the samples of them that a page holds."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Claims as JUnit XML, which continuous integration shows: a test case each."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from xml.etree import ElementTree

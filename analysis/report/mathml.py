@@ -1,7 +1,5 @@
 """LaTeX -> MathML, through a whitelist: what is not known to be harmless is shown as its source."""
 
-from __future__ import annotations
-
 import base64
 import re
 import unicodedata

@@ -1,7 +1,5 @@
 """Where everything stands on the page: unique anchors, cells of tables, colours of statuses."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections import Counter

@@ -1,7 +1,5 @@
 """The shell of a page: Jinja2 environment, own style and script, content policy, writing."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -6,8 +6,6 @@ script (`page`).  The page's content policy allows exactly those two, by hash, a
 outside.
 """
 
-from __future__ import annotations
-
 import hashlib
 import html
 import json

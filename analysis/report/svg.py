@@ -1,7 +1,5 @@
 """matplotlib figure -> inline SVG: the same bytes every time, in the page's colours."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence

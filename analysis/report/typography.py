@@ -5,8 +5,6 @@ Whatever a report says is plain text; a formula inside it is written as LaTeX be
 stand.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Figures that pages of papers share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

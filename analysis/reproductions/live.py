@@ -1,7 +1,5 @@
 """The page of a paper that runs: each example with sliders, behind its figures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

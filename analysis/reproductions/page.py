@@ -1,7 +1,5 @@
 """The page of a paper: its record and its runs -> a report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path

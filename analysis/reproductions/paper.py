@@ -1,7 +1,5 @@
 """A paper as a record: what it prints, where that was read, how it is computed, its runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Study file -> experiment and design."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace

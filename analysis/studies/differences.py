@@ -1,7 +1,5 @@
 """What differs between two runs: what they were computed from, what they found, their tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

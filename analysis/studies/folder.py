@@ -13,8 +13,6 @@ Every file of JSON carries a key of its content, and every part the key of its o
 missing, was edited or belongs to another loop is refused, not shown.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -10,8 +10,6 @@ The shapes that the JSON files of a run folder are validated against.
 A file may be intact and carry the right key, and yet be of another version or made by hand.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager

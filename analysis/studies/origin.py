@@ -5,8 +5,6 @@ adds to a run or draws from it compares first: no statement about one loop appea
 numbers of another one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

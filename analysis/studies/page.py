@@ -1,7 +1,5 @@
 """What kinds of analysis share on a page: words, tables, deviations, running estimates."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any

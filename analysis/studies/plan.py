@@ -1,7 +1,5 @@
 """What a study will take, before it runs: rows, time, disk."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

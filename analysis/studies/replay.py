@@ -1,7 +1,5 @@
 """One row of a run again, bit for bit, with everything that can be seen of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

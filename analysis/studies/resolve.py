@@ -1,7 +1,5 @@
 """What a study file refers to by name: functions in files and modules, blocks, laws of SciPy."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 from collections.abc import Callable, Mapping

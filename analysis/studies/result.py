@@ -1,7 +1,5 @@
 """What a study and each of its analyses have found: what a report is made of."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path

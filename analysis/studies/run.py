@@ -1,7 +1,5 @@
 """Study -> folder of results: the rows, then one analysis after the other, each kept when done."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor

@@ -1,7 +1,5 @@
 """JSON files of a run folder, sealed; numbers that JSON lacks are kept as text."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Backlash: the play operator, whose memory is a state."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Actuators with dynamics: rate limiter, first-order and second-order lag."""
 
-from __future__ import annotations
-
 from ..arguments import number
 from ..equations import equation
 from ..functions import clip

@@ -1,7 +1,5 @@
 """Generalised Prandtl-Ishlinskii operator: plays between two envelopes that are not straight."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..equations import equation

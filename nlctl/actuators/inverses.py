@@ -4,8 +4,6 @@ An inverse takes the wanted output of the actuator as its input u; its own outpu
 actuator needs.  ``cascade({"inverse": DeadZoneInverse(), "zone": DeadZone(...)})`` is then v = u.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States of actuators: memories, their names and where they start; states that are the output."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Hysteresis of plays: stop, Prandtl-Ishlinskii operator, one-sided dead zones."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Relays with hysteresis, one or many: relay, Preisach operator."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

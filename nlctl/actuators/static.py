@@ -1,7 +1,5 @@
 """Actuators without memory: dead zone, saturation, gain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..equations import equation

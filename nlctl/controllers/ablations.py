@@ -1,7 +1,5 @@
 """The paper's controller with a piece left out or replaced: what is each piece worth?"""
 
-from __future__ import annotations
-
 import control as ct
 
 from ..annotations import as_annotated

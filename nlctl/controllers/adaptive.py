@@ -1,7 +1,5 @@
 """The paper's controller: its blocks, connected."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import control as ct

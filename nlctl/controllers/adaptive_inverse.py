@@ -1,7 +1,5 @@
 """Adaptive inverse of a dead zone, in front of an actuator whose break points are unknown."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..equations import equation

@@ -1,7 +1,5 @@
 """Extremum seeking: a parameter is driven to where a performance that is only measured is best."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..equations import equation

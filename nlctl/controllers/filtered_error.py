@@ -1,7 +1,5 @@
 """Filtered tracking error (14) and the known part Y_d of its derivative (18)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Control law for an input gain of known sign: no Nussbaum function, and a proof for all time."""
 
-from __future__ import annotations
-
 from ..equations import equation
 from ..functions import smooth_sign
 from ..params import param, record

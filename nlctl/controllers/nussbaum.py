@@ -1,7 +1,5 @@
 """Nussbaum law (23), (24): it finds the sign of the input gain by itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """PID controllers: of measured states, the usual baseline; and of (ref, y) or of an error."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any

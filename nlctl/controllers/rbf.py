@@ -1,7 +1,5 @@
 """RBF network (10), (19): Gaussian basis, where its centres lie, and its weights (25)."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -5,8 +5,6 @@ zero of N the loop loses its sign.  These blocks have the signals of `NussbaumLa
 its place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Adaptive robust term (23), (25)."""
 
-from __future__ import annotations
-
 from ..equations import equation
 from ..functions import smooth_sign
 from ..params import param, record

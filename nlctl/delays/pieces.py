@@ -1,7 +1,5 @@
 """Functions of time as polynomials, piece by piece: what machine code knows of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The block whose outputs are its inputs at an earlier time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How delays vary in time, as polynomials that machine code evaluates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

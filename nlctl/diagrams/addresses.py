@@ -5,8 +5,6 @@ A name without a block means what python-control means by it: every third-party 
 it; in a diagram of `nlctl.interconnect`, where each has a value of its own, it must mean one.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Connecting blocks by the names of their signals."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations

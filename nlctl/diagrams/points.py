@@ -6,8 +6,6 @@ python-control's own rates and outputs, here and nowhere else.  The values are t
 the diagram, so that nobody else who evaluates it is disturbed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 

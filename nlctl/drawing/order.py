@@ -1,7 +1,5 @@
 """Order of the blocks, and the strips of the page that the arrows use; see `routes`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import TopologicalSorter

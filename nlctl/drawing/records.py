@@ -1,7 +1,5 @@
 """What a block diagram is made of on paper: records, lettering, pen strokes.  Units are points."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Mapping, Sequence

@@ -8,8 +8,6 @@ multiples of `GRID`, a bent inlet never at the height of another wire's outlet, 
 its own vertical lane in each gutter, so no two wires ever lie on top of one another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

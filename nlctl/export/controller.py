@@ -1,7 +1,5 @@
 """A sampled controller as the program of its computer, and all equations of a loop as code."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Object code of a controller for other machines: LLVM makes it of the IR that was simulated."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from types import MappingProxyType

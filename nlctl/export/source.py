@@ -1,7 +1,5 @@
 """C99 of controllers and of equations: headers and sources, with what every number means."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Names and numbers of a program in C: labels as comments and as indices."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping

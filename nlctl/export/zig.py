@@ -1,7 +1,5 @@
 """Zig, which compiles and links for other machines: it comes from PyPI, in the extra ``export``."""
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 import sys

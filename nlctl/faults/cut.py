@@ -1,7 +1,5 @@
 """Putting faults into a diagram: a signal is cut, and goes through the block of its fault."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ A fault begins at its ``onset`` and lasts ``duration`` seconds; before and after
 passes as it is.  Where a condition begins it, `Latch` remembers since when that has been met.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A fault: which signal, how it changes, and when."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

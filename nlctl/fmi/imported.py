@@ -1,7 +1,5 @@
 """An FMU as a block of a diagram."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

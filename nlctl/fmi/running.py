@@ -4,8 +4,6 @@ A block's equations are functions of time, states, inputs and parameters.  What 
 is none of its states; so each inner state that it has been in has a number, and that is one.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

@@ -8,8 +8,6 @@ symbolic link is a text on Windows and its content twice in archives; the reposi
 names the checkout that was installed, also where ``PYTHONPATH`` names another one.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Sequence

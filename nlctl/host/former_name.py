@@ -5,8 +5,6 @@ a checkout that is what the folder does under its former name.  A user's own ``a
 first, as the folder of a script does on ``sys.path``.
 """
 
-from __future__ import annotations
-
 import filecmp
 import functools
 import sys

@@ -1,7 +1,5 @@
 """What notebooks show: a heading and a table, in which everything that is given is text."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Iterable, Sequence
 

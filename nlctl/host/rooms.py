@@ -5,8 +5,6 @@ The top once had all blocks, errors and results: ``nlctl.BoucWen`` still is
 ``__all__`` of the rooms, whose import would take seconds.
 """
 
-from __future__ import annotations
-
 import ast
 import difflib
 import functools

@@ -1,7 +1,5 @@
 """Worker processes that end with the process that they work for, however that ends."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import threading

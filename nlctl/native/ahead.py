@@ -1,7 +1,5 @@
 """Machine code made before it is needed."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

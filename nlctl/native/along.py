@@ -5,8 +5,6 @@ So a Jacobian matrix of n states takes n / `DIRECTIONS` evaluations, and the gen
 sides serves for it as it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -5,8 +5,6 @@ some points of a run's own trajectory its right-hand side and outputs are compar
 ``dynamics`` and ``output`` of the diagram as it stands.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@ A record that says what was read stays as it is.  What follows from it at some c
 code, lies in a field of its own, by kinds of things; whoever makes a kind looks there first.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any, TypeVar

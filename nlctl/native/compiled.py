@@ -1,7 +1,5 @@
 """Machine code from a diagram."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ What leaves a delay is an input, and what arrives there an output.  Where all is
 equal, and of small sines the one is the other times exp(-s tau).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Machine code computes the same in its arrays ``g``, ``m`` and ``reset``.  What i
 that are conditions of the very expressions whose rates are compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -10,8 +10,6 @@ root ends before its first step where it begins at the root: of such a point no 
 derivative, and differences are taken, which is said.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

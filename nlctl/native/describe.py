@@ -1,7 +1,5 @@
 """A compiled diagram in words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 import control as ct

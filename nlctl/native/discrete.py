@@ -1,7 +1,5 @@
 """Discrete time: a compiled program applied to itself, sample by sample."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

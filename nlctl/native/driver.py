@@ -1,7 +1,5 @@
 """Runs of a compiled program, from arrays alone: nothing here touches a diagram."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial

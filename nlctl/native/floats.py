@@ -5,8 +5,6 @@ that what is read of it holds for integers alone.  Where something is to move by
 parameter is a float in the equations, which are read again.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Collection, Mapping
 from typing import Any, TypeVar

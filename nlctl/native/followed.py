@@ -4,8 +4,6 @@ What `integrate.events.sharp` does for machine code's own steps, for those of th
 values of the arguments at many places of a step, with parabolas through three of them in between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

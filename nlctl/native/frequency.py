@@ -1,7 +1,5 @@
 """Frequency responses of diagrams with transport delays: exact, since no delay is approximated."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What has happened in a run of machine code: a table of its events."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """What a run keeps of signals that are delayed: before it begins, and while it goes on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -5,8 +5,6 @@ that of the sources beside it, or is of a newer LLVM than there is here, what nu
 sources is used instead, and kept in the cache.
 """
 
-from __future__ import annotations
-
 import ctypes
 import functools
 import hashlib

@@ -1,7 +1,5 @@
 """Exact Jacobians of compiled diagrams, from the derivatives of their expressions."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import warnings

@@ -1,7 +1,5 @@
 """What the graph of a diagram says of its conditions, for a run in python-control."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial

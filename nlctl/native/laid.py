@@ -1,7 +1,5 @@
 """What a task has of its program alone: it is laid out once, for all runs."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ members at a time: each expression once, whatever depends on parameters alone in
 generator makes machine code of the plan (`codegen.ir`), and one interpreter carries it out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

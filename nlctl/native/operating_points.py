@@ -1,7 +1,5 @@
 """Where a diagram stays: equilibria and other operating points, by exact derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -3,8 +3,6 @@
 Machine code has NaN where Python raises.  Who reads the message wants the error itself.
 """
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Responses of compiled diagrams."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

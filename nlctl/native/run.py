@@ -1,7 +1,5 @@
 """A run in machine code while it lasts: members that are integrated in a batch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """How a run is integrated; what python-control is told of its integrator, taken or refused."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real

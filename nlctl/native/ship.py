@@ -5,8 +5,6 @@ twenty seconds.  Until then the new sources are compiled by numba on each machin
 the everyday suite fails.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Memory of runs that are over, for the next run: to lay it out takes longer than a short run."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any, NamedTuple
 

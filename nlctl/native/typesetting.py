@@ -1,7 +1,5 @@
 """The equations of blocks and diagrams as LaTeX, read from the functions that are run."""
 
-from __future__ import annotations
-
 import itertools
 import re
 import sys

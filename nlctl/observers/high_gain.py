@@ -1,7 +1,5 @@
 """High-gain observer of a chain of integrators whose end is not known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any

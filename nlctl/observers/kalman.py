@@ -1,7 +1,5 @@
 """Extended Kalman filter in continuous time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Luenberger's observer of a linear plant."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import control as ct

@@ -1,7 +1,5 @@
 """Names of an observer's signals."""
 
-from __future__ import annotations
-
 from ..arguments import are_names, names_in
 from ..errors import ParameterError
 

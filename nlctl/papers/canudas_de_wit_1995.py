@@ -4,8 +4,6 @@ The numbers are those of a program that reconstructs its figures: see
 ``nlctl report canudas_de_wit_1995``.
 """
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

@@ -3,8 +3,6 @@
 The numbers are those of the first author's program for it: see ``nlctl report chowdhary_2010``.
 """
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

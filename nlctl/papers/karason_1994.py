@@ -4,8 +4,6 @@ The numbers are those of a program that reproduces its scalar example: see
 ``nlctl report karason_1994``.
 """
 
-from __future__ import annotations
-
 import control as ct
 
 from ..actuators import Gain

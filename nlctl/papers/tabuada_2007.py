@@ -3,8 +3,6 @@
 The numbers are those that readers of the article quote: see ``nlctl report tabuada_2007``.
 """
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

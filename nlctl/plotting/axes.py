@@ -1,7 +1,5 @@
 """What all figures share: colours, line styles, axes."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Many runs over time: bands of quantiles, single runs, limits."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType

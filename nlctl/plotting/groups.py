@@ -4,8 +4,6 @@ Of one kind are signals that are equal but for their sign, those of which one is
 difference of two others, and what goes into an actuator with what comes out of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Signals of one run over time, those of one kind in one row."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ Between two of them a sign that has changed is located; where a function may be 
 least value is looked for.  A memory is located where it reverses, and where it jumps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

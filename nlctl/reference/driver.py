@@ -1,7 +1,5 @@
 """One driver: simulate to the next stop, jump, go on."""
 
-from __future__ import annotations
-
 import bisect
 import math
 import warnings

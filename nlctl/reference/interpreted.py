@@ -1,7 +1,5 @@
 """A run in python-control's equations: what it is asked, and what it returns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

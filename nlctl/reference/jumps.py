@@ -1,7 +1,5 @@
 """What jumps in a diagram: sampled blocks at clocks, memories, and blocks with guards."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 

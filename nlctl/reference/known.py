@@ -1,7 +1,5 @@
 """What is known before a run in python-control of where its equations change."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

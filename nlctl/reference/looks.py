@@ -5,8 +5,6 @@ them, there are waves from place to place, or a jump: the step is looked at in t
 thirds, until it does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple

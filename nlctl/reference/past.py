@@ -7,8 +7,6 @@ pulse that a step was short for.  Where none does, it is divided between steps, 
 into halves.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections import deque

@@ -4,8 +4,6 @@ A hash of a state does so, and a random number at each call.  Error control shor
 what is left of such noise is within the tolerance, and a run has no end of these steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 

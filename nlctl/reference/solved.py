@@ -4,8 +4,6 @@ It has been made of right-hand sides behind an event as well, and by a multistep
 within.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

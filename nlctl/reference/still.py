@@ -1,7 +1,5 @@
 """What stands for an integrator of SciPy: without states, and over what rounding alone crosses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

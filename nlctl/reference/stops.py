@@ -1,7 +1,5 @@
 """Instants at which a run stops, as far as they are known before it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

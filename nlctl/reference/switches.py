@@ -1,7 +1,5 @@
 """Whether there is an end of a run's switches, from the times at which its conditions were at 0."""
 
-from __future__ import annotations
-
 from collections import defaultdict, deque
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The arguments of a run: read as python-control reads them, and checked where they enter."""
 
-from __future__ import annotations
-
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence

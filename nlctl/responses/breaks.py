@@ -1,7 +1,5 @@
 """When the signals of a run may jump or bend: the times of its events, and samples in between."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Functions of a run whose changes of sign are its events, or its end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

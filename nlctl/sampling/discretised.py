@@ -1,7 +1,5 @@
 """Blocks in continuous time as programs in discrete time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

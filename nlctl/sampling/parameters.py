@@ -1,7 +1,5 @@
 """What may be varied of a sampled block: its clock and its converters, as parameters."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..equations import equation

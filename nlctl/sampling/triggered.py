@@ -1,7 +1,5 @@
 """Event-triggered sampling: signals that are held until a condition of the diagram is met."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..equations import equation

@@ -5,8 +5,6 @@ there are.  With it the equations can be had as they were right before a jump, a
 where they have jumped.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

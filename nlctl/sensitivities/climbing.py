@@ -9,8 +9,6 @@ gains that matter move, those of the shortest step with nine tenths of that prom
 next to nothing would else go to the end of the reach, where slopes say nothing any more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -6,8 +6,6 @@ nobody sees.  Unless what touches it moves as it does itself: the crests of a pe
 touch the memory that the first has left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce

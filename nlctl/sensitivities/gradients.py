@@ -1,7 +1,5 @@
 """Gradients of metrics and margins: what derivatives of signals do to a number of a response."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..annotations import as_annotated

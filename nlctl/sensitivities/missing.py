@@ -7,8 +7,6 @@ play behind a relay that switches at once is driven first as the relay was, then
 Its derivative is that of the last that has moved it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

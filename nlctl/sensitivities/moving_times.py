@@ -9,8 +9,6 @@ delay than has left it before, a jump has arrived: the run ends a step there any
 sent says what derivatives need (`saltation`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

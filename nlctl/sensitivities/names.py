@@ -1,7 +1,5 @@
 """Of what derivatives are taken, and by what: names that are looked up in a diagram."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

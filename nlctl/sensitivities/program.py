@@ -5,8 +5,6 @@ with memories and samples what the derivative of these says, and jump at conditi
 (`saltation`).  So one run has them with the states, under the same error control.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Derivatives of a run: what is asked, how it is run, and what is returned."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -11,8 +11,6 @@ Mathematics 11, 1958; Filippov, Differential Equations with Discontinuous Righth
 both by name only).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce

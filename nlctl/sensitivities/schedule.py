@@ -1,7 +1,5 @@
 """A diagram's schedule with room for derivatives: rates of inputs, and of what is delayed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """The sides of all jumps of a diagram: which are kept, and the equations on these."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce

@@ -7,8 +7,6 @@ condition is seen from values at random, with parameters near those of the run: 
 for all of these is the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce

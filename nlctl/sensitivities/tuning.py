@@ -1,7 +1,5 @@
 """Gains by search: margins of requirements raised, or a cost lowered, with derivatives of runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 

@@ -7,8 +7,6 @@ derivative becomes S- + f- t*', with the derivative S- and the rate f- of what h
 then.  At a smooth turn f- is 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The relay without hysteresis, and its sliding motion."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

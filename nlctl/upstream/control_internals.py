@@ -9,8 +9,6 @@
   ``__init__`` only: a subclass can have them as properties.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 

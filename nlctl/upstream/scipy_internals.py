@@ -1,7 +1,5 @@
 """What SciPy's laws of probability are written with, and its documentation does not name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

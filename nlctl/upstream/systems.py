@@ -1,7 +1,5 @@
 """What nlctl asks of python-control's systems and responses, as types: no class is named."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """What moves: the rates of a diagram, or of a function, as expressions of its states."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

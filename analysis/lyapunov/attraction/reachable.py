@@ -1,7 +1,5 @@
 """Where all solutions from a box of initial states are over a time, enclosed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """A region of attraction: a set from which everything goes to an equilibrium, proved."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ linear in them and in Q.  The numbers that are found are rounded to fractions, w
 the equation is put into Q, and Q is positive definite if its leading minors are positive.
 """
 
-from __future__ import annotations
-
 import itertools
 import operator
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """The split of an actuator whose k is v/u clipped to bounds, and the range of its eps_u."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -4,8 +4,6 @@ The split of an actuator is not unique.  Any bounds 0 < k_1 <= k_2 give one: k u
 between the lines k_1 u and k_2 u, and eps_u the rest.  A small k_1 buys a small eps_u.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any, Literal

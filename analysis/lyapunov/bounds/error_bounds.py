@@ -8,8 +8,6 @@ The final bound of the proof: V(0), (31), (34)-(36), as formulas of the controll
 Each formula is written once and serves floats, balls and polynomials alike.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Assumption 3: the sector of F(x, v) = f(x, v) - f(x, 0), (4)-(8), proved over a box."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The initial states that a certificate is about: a box of all states, or a level set of V."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Iterator, Mapping

@@ -6,8 +6,6 @@ the solution of a convex programme.  Weights are computed on a grid, where eps* 
 `approximation_error` proves eps* over the whole box.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import Any

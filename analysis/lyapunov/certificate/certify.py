@@ -1,7 +1,5 @@
 """The proofs that there are, and bounds that hold for all time: which proof a loop is one for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Gains with the smallest proved bound of |r| under a limit of |u|."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass

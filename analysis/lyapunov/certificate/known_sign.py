@@ -11,8 +11,6 @@ hence |r| <= C_0 = sqrt(2 max{V(0), alpha_0/alpha_1}), alpha_0 being all that st
 No Nussbaum function and no Lemma 1 take part.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -10,8 +10,6 @@ and |r| falls wherever it is above rho = phi M / (k_1 G_min K), if rho < phi.  A
 gives the box, the box gives M, and M gives max{|r(0)|, rho(C)}.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

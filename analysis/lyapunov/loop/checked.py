@@ -15,8 +15,6 @@ every eighth one, if both loops consist of the same functions with the same valu
 they can only differ in their wiring then, and that has no values.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -13,8 +13,6 @@ The integral of (32) and (33), as states of a block that is integrated with the 
    I' = -\alpha_1 I + [k G N(\zeta) + 1] \zeta' .
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable

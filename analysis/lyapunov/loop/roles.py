@@ -10,8 +10,6 @@ Whatever was checked of a loop holds as long as its functions, wiring and values
 key of these sees whether they are; where no key sees everything nothing is remembered.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Signals of an observed loop over time, and margins of statements about them."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import field

@@ -9,8 +9,6 @@ The reference block itself is differentiated: with its own rates :math:`x' = f(t
 by central differences of order 8 with four steps, so that one fits whatever the frequencies are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -9,8 +9,6 @@ weights.  The loop's is the gradient of V times its rates.  Signals u and v are 
 that both agree at every state, whether a run comes there or not.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

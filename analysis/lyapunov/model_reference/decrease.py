@@ -7,8 +7,6 @@ give V' <= -s^2 + 2 a s + b: as V stays bounded, the mean of s^2 is at most (a +
 in the end, which does not depend on Gamma.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal

@@ -11,8 +11,6 @@ takes away as much of it as the regressor spans, in rational arithmetic: where i
 of delta is left but disturbances.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

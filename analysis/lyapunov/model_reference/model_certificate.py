@@ -1,7 +1,5 @@
 """What was proved of a loop of model reference adaptive control, with every constant."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import field
 from typing import Any

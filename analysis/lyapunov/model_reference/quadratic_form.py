@@ -5,8 +5,6 @@ weights of the loop learn, whatever has been rounded off in it: Q = -(A^T P + P 
 exactly.  That P and Q are positive definite, and that Q - mu P is, is proved by leading minors.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ k G is within its bounds; for a constant k G it is where the integral of N is 0,
 value.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

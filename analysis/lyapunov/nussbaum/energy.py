@@ -12,8 +12,6 @@ turn into growth of V.  Where zeta never falls, D = 0 there, and V >= 0 bounds t
 lasts from below.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """When the slow drift of zeta will burst the loop, as a number of a run that ends long before."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A loop far beyond the paper's 20 s: whether its gain loses its sign, and what predicted it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal

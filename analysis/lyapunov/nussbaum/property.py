@@ -6,8 +6,6 @@ r"""Property (12) of Nussbaum functions, checked over a finite range.
 No finite range can prove a limit: what is reported here as a type is *checked*.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -16,8 +16,6 @@ so that the drift stops where |N| = p / q, if the lobe has such a place; otherwi
 until the budget is spent.  p and q are fitted to a response.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import Any

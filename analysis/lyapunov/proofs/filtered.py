@@ -1,7 +1,5 @@
 """What a plant asks of the controller while the filtered error keeps a bound."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

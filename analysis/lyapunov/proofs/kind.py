@@ -5,8 +5,6 @@ bound, and so on.  If the new bound is below the one that gave the box, then tha
 up to the first time that it was, the signals stayed in the box, and so below the new bound.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

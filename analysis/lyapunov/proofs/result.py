@@ -7,8 +7,6 @@ wider than they were proved, so that plain interval arithmetic follows them, and
 that the recheck does not answer with yes.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """The verdict on a study, the claims behind it, and which requirement each of them answers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

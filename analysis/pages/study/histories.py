@@ -1,7 +1,5 @@
 """The loop of a run made again, and some of its rows simulated again, with signals kept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import Any

@@ -1,7 +1,5 @@
 """The loop that a study is about, as its page shows it: diagram, parameters, equations, source."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import inspect

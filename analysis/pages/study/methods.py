@@ -1,7 +1,5 @@
 """How a study was done, what it does not show, and the sources."""
 
-from __future__ import annotations
-
 from nlctl.wording import counted
 
 from ...studies.result import Result

@@ -1,7 +1,5 @@
 """A robustness study as a report, or as sections of another one."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext

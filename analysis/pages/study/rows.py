@@ -1,7 +1,5 @@
 """The report's sections on the rows of a study: what was asked and how they ended."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The end of the paper's report: on computers, rivals, what is open, numerics, limits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The report's part on the proof: what happens far beyond 20 s, and the ledger of each example."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

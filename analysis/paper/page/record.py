@@ -1,7 +1,5 @@
 """Lv et al. 2017 as a record: what its page has in common with that of every paper."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from nlctl import paper

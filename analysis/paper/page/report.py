@@ -1,7 +1,5 @@
 """The reproduction of the paper as a report: verdict, claims, sections."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 

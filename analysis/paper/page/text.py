@@ -3,8 +3,6 @@
 Text only.  The numbers in use are filled in from the blocks themselves.
 """
 
-from __future__ import annotations
-
 from ...pages.study.loop import Published
 from ...report.document import Equation, Paragraph
 from ...studies.kinds.context import CLOPPER

@@ -1,7 +1,5 @@
 """What is simulated for each row of a design, and what is measured on it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace

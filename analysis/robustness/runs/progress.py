@@ -1,7 +1,5 @@
 """How far a sweep is, and when it has seen enough."""
 
-from __future__ import annotations
-
 import time
 from bisect import insort
 from collections.abc import Callable, Iterator

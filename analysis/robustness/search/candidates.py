@@ -1,7 +1,5 @@
 """Which rows a search for the worst case runs next: corners, uniform draws, CMA-ES."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import warnings

@@ -1,7 +1,5 @@
 """A witness run again in other ways, before it is called confirmed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """How the probability of a violation grows with the size of the uncertainty."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

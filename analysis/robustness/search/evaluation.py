@@ -1,7 +1,5 @@
 """What every search asks of a row: its margin, by simulation or by a formula."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 

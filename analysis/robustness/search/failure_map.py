@@ -1,7 +1,5 @@
 """Where in the plane of two quantities a spec fails: margins, dense along the boundary."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How far the uncertainty may grow before a violation is found."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any

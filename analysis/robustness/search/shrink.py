@@ -1,7 +1,5 @@
 """The smallest part of a violating row that still violates the spec."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence

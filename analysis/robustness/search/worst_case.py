@@ -1,7 +1,5 @@
 """The row with the lowest margin that a search finds; what it does not find proves nothing."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Mapping

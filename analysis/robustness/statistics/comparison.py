@@ -1,7 +1,5 @@
 """Controllers compared on the same samples: who is better, by how much, and is it chance?"""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import get_args
 

@@ -1,7 +1,5 @@
 """Statements about the probability of a violation that are exact, and when they may be made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, get_args
 

@@ -1,7 +1,5 @@
 """Controllers against each other on the same rows: differences, wins, and violations."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from typing import Literal, get_args

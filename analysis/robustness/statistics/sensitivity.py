@@ -1,7 +1,5 @@
 """Which quantities matter: screening, shares of the variance, and what sets failures apart."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

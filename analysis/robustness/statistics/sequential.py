@@ -1,7 +1,5 @@
 """Watching a study while it runs: bounds that hold at every moment, and what is decided."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Literal
 

@@ -12,8 +12,6 @@ looks at its own time alone may not stand next to one that begins with "always" 
 ``always |e| <= 0.6 and |u| <= 0.5`` would look at u at t = 0 only.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """A space validated against the diagrams that it is to be applied to."""
 
-from __future__ import annotations
-
 import inspect
 import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Which points of a space are run: independent draws, or rows that were chosen otherwise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field, replace
 from typing import Any, Literal

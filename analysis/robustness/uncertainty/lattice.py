@@ -1,7 +1,5 @@
 """Rows at chosen places of the boxes: a grid, the corners, one quantity at a time."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

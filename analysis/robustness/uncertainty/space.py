@@ -1,7 +1,5 @@
 """Everything that is uncertain in a study, and its values at points of the unit cube."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ Two studies may each have a ``plant.py``; both are loaded, none is taken for the
 imports what lies next to it by its plain name, as a script does; installed packages come first.
 """
 
-from __future__ import annotations
-
 import builtins
 import contextlib
 import hashlib

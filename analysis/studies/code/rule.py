@@ -20,8 +20,6 @@ each file or module of a study: which study, what it calls the file, and what is
 study, another content, another name: another statement.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import importlib.util

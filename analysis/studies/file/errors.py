@@ -1,7 +1,5 @@
 """Mistakes in a study file: all of them at once, each with its place."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, get_args

@@ -1,7 +1,5 @@
 """TOML within limits: whatever a file holds is read or refused at once; the line of every key."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator, Mapping

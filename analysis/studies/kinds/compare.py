@@ -1,7 +1,5 @@
 """Options of one keyword of the loop, compared on the same samples."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Literal

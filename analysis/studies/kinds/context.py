@@ -1,7 +1,5 @@
 """What several kinds of analysis share: a response, and sources."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The margin over the plane of two quantities, refined at the boundary."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

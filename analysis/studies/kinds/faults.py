@@ -1,7 +1,5 @@
 """What faults on the signals of the loop do, one at a time and in pairs."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Screening: how much a step in each quantity changes a response."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pydantic import Field

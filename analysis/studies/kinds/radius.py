@@ -1,7 +1,5 @@
 """The smallest size of the uncertainty at which a violation is found."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """How far values in failing rows differ from those in passing ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a probability is below a limit, decided while the rows come in."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import ClassVar
 

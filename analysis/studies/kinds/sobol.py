@@ -1,7 +1,5 @@
 """Shares of the variance of a response."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pydantic import Field

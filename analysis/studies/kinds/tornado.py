@@ -1,7 +1,5 @@
 """Derivatives of a margin at the nominal values, times how far each quantity may go."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gains by search on a few samples, validated on fresh ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar

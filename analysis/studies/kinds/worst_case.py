@@ -1,7 +1,5 @@
 """The row with the lowest margin that a search finds."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """The shape of a study file, with kinds of one's own: what ``kind = "spread.py:spread"`` means."""
 
-from __future__ import annotations
-
 import functools
 import operator
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """File -> study, validated against its loop; every mistake at once."""
 
-from __future__ import annotations
-
 import copy
 import json
 import tomllib

@@ -1,7 +1,5 @@
 """A study validated against its loop: every name, every formula, every id, every analysis."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace

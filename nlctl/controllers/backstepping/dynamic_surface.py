@@ -1,7 +1,5 @@
 """Dynamic surfaces: backstepping that filters its virtual controls and differentiates none."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

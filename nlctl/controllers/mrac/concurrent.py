@@ -1,7 +1,5 @@
 """Concurrent learning: weights that learn from recorded points too, and their record."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

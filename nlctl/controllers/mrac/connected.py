@@ -1,7 +1,5 @@
 """Model reference adaptive control: its blocks, connected."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import control as ct

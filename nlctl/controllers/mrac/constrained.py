@@ -1,7 +1,5 @@
 """Model reference adaptive control in the presence of an input constraint."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

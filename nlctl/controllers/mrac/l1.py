@@ -1,7 +1,5 @@
 """L1 adaptive control: a state predictor, fast adaptation, and a low-pass filter in the law."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

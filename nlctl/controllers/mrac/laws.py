@@ -1,7 +1,5 @@
 """Control laws of model reference adaptive control."""
 
-from __future__ import annotations
-
 from ...equations import equation
 from ...errors import ParameterError
 from ...params import param, record

@@ -1,7 +1,5 @@
 """The error between plant and reference model, and what the adaptation laws see of it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import control as ct

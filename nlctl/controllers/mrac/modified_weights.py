@@ -4,8 +4,6 @@ Sigma-modification is `nlctl.controllers.AdaptiveWeights`, (25); with ``sigma_1=
 gradient law.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

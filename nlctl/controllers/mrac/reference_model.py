@@ -1,7 +1,5 @@
 """The reference model of model reference adaptive control, for plants of class (1)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

@@ -1,7 +1,5 @@
 """Regressors of adaptive laws: what the weights are multiplied by."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

@@ -1,7 +1,5 @@
 """Funnel control of any relative degree, from the output and its derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

@@ -1,7 +1,5 @@
 """Prescribed performance without approximation, for pure-feedback plants."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...equations import equation

@@ -1,7 +1,5 @@
 """Sliding mode with a boundary layer: the usual robust baseline."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

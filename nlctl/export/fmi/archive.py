@@ -1,7 +1,5 @@
 """An FMU as a file: everything is made before a byte of it is written."""
 
-from __future__ import annotations
-
 import io
 import os
 import struct

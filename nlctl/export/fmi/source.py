@@ -1,7 +1,5 @@
 """The sources of an FMU: a diagram's tables and equations, and around them what all FMUs share."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """The variables of a model: names, units, meanings, bounds, and their value references."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection
 from dataclasses import dataclass

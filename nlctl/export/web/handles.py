@@ -1,7 +1,5 @@
 """What may be moved of a loop on a page: parameters, initial states, inputs, faults; by name."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -7,8 +7,6 @@ into it as numbers of bytes.  So every record is made of parts of 64 bits here, 
 stored as a whole is stored part by part.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import lzma

@@ -6,8 +6,6 @@ of LLVM's IR, and each address in a table a reference to one: the linker has the
 they are, and the memory of a process of 64 bits becomes that of a machine of 32.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 

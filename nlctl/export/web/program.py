@@ -1,7 +1,5 @@
 """A loop as a WebAssembly module that runs it: equations, integrators and memory in one file."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 import lzma

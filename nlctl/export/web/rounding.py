@@ -6,8 +6,6 @@ of a constant, is a product in two parts of which the first is exact.  exp, log 
 control are written out: those of two C libraries differ in the last place.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

@@ -3,8 +3,6 @@
 ``python wasm_object.py SOURCE.ll ...`` writes SOURCE.o next to each.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -10,8 +10,6 @@ Where there have been very many, and the times in which they become twice as fas
 well, they have no end, however well they are resolved.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -22,8 +22,6 @@ It is looked for in windows of so many steps that a usual run has none, and rare
 goes on as it began.  What is found of a member never depends on the members beside it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """At which block a run chatters, and between which values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ and the run has been on one side of it.  Otherwise the straight way leads as far
 as the run does: the next switch of the same condition is another one.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

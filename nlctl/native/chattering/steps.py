@@ -1,7 +1,5 @@
 """Steps that a run has tried, as they are looked at: where they went, and a jump on their way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

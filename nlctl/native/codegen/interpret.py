@@ -5,8 +5,6 @@ compared with in tests: the same levels, loops and places in memory, but NumPy's
 access outside of an array.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -9,8 +9,6 @@ A step that does not bring F(z) and z closer together is halved.  The search beg
 solution the result is NaN.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

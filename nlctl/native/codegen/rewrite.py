@@ -5,8 +5,6 @@ about a jump: floor(t / T) at t = 3 T, a comparison with a limit that is met exa
 there by arithmetic alone is therefore left as it is, and is computed operation by operation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 

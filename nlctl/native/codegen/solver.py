@@ -4,8 +4,6 @@ Like a call of an opaque function a search has its arguments in rows of `c`, its
 and it goes member by member: what one member needs has no influence on another one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The inputs of every block of a python-control diagram, by its own wires."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

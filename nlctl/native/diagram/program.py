@@ -1,7 +1,5 @@
 """What a program takes and gives: where parameters lie, which events and memories there are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -6,8 +6,6 @@ is which output depends on which input: a block that feeds itself through separa
 evaluated more than once and is not an algebraic loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter

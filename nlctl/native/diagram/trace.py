@@ -1,7 +1,5 @@
 """A block's functions on symbols: its time, states, inputs and parameters as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

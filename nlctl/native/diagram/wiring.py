@@ -1,7 +1,5 @@
 """The wires of a diagram: what feeds every block, nested diagrams flattened."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Intervals as pairs of values, and arithmetic, comparisons and choices of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

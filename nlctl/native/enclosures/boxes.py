@@ -1,7 +1,5 @@
 """Machine code that encloses functions of a box, and what is asked of such functions."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 from collections.abc import Callable, Sequence

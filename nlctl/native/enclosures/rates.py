@@ -1,7 +1,5 @@
 """The rates of a diagram as functions of its states alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import control as ct

@@ -12,8 +12,6 @@ or none is.  To keep that, an infinite lower bound +inf, which overflow makes, b
 float before it is rounded outwards, and an upper one -inf the least.
 """
 
-from __future__ import annotations
-
 from ..codegen.ir.text import Body, Operand, Value
 
 UNIT = 2.0**-52

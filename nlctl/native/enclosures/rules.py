@@ -5,8 +5,6 @@ rise or fall are known by their ends, periodic ones by their ends and the turnin
 them.  Outside of its domain a function has no value: the ends are not numbers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

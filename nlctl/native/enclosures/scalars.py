@@ -7,8 +7,6 @@ a run computes; but the derivative of 0.1 (0.3 x) is the product of both floats,
 it has to hold that.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction

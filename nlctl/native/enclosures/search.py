@@ -4,8 +4,6 @@ Boxes are taken from a stack, or a heap, as many together as there are lanes.  W
 depends on no thread and on no other search.
 """
 
-from __future__ import annotations
-
 import math
 
 from ..machine.address import call_enclosure

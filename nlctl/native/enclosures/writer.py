@@ -7,8 +7,6 @@ Boxes are in lanes: row i of `x` is the lower end of side i in every lane, then 
 row k of `v` the same of result k.  What `judge` writes is in `JudgedRows`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import reduce
 from itertools import accumulate

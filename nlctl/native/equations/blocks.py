@@ -1,7 +1,5 @@
 """A schedule as expressions: blocks traced, wired, loops solved, what cannot be traced called."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Reads the blocks of a schedule as expressions: traced, wired, loops solved, the opaque called."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace

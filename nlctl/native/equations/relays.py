@@ -1,7 +1,5 @@
 """Ideal relays of a diagram that is being read as expressions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields, replace
 

@@ -10,8 +10,6 @@ does with its input s is just that: one without signals stands for the condition
 outputs while it slides.  Everywhere else the equations are what they were.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce

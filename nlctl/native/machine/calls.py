@@ -7,8 +7,6 @@ results, with the arguments behind it, and raised by what ends the evaluation.  
 function is not called again for that member.
 """
 
-from __future__ import annotations
-
 import ctypes
 import linecache
 import sys

@@ -1,7 +1,5 @@
 """A program's machine code for batched members, whichever way it can be had."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ arguments, what it closes over, and the functions and constants that these refer
 was edited after it was imported misleads nobody.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dis
 import functools

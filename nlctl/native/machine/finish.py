@@ -9,8 +9,6 @@ Relied on in llvmlite: text is parsed by `parse_assembly`, which reads what othe
 write; symbols that are added to the process are found by MCJIT before those of libraries.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import lzma

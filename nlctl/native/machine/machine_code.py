@@ -4,8 +4,6 @@ numba's own cache writes files that nobody verifies, keyed by the file of the ou
 alone.  Here a function's dispatcher is given a cache of ours, which asks `store`.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import pickle

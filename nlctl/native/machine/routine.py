@@ -1,7 +1,5 @@
 """The functions of a program, as Python and the integrators call them."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ What stands above the folder needs no such question: who can rename it can put a
 its place, but its files belong to somebody else.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import os

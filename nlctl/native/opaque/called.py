@@ -5,8 +5,6 @@ through a few lines of source: parameters as a record that is read as a dict is,
 argument that the function takes apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

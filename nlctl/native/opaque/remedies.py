@@ -1,7 +1,5 @@
 """What to do about a function that is called unchanged: how it would become expressions."""
 
-from __future__ import annotations
-
 import re
 
 # of what a reason says, the first line that fits

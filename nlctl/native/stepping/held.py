@@ -1,7 +1,5 @@
 """A run in continuous time, step by step, with inputs that are held over each step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -4,8 +4,6 @@ Each is a `HeldRun` with a window of its own, and makes the steps that it makes 
 machine code.  What is written before a step and read after it lies in one array for all of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Runs in steps of one length, and one in discrete time, from sample to sample."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

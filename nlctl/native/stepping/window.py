@@ -4,8 +4,6 @@ A run with held inputs has each value until the float before the next time.  A s
 before anything that is due at the next time; with the next inputs it continues, as the run does.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

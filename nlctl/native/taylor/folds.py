@@ -7,8 +7,6 @@ of an order go over earlier orders alone, so that they are independent of each o
 j has as many of them at once as there is room for in registers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

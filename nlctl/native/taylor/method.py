@@ -1,7 +1,5 @@
 """Taylor's method for a run: what it cannot do is refused by name, what it needs is laid out."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The functions of Taylor's method in plain Python, where there is no machine code."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Products in derivatives: factors that do not vary, and those that are 0."""
 
-from __future__ import annotations
-
 from ...expressions.graph import Expr, Graph
 
 

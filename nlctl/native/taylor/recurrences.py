@@ -18,8 +18,6 @@ what is so large that it does not depend on it any more, as 1 / cosh(t)^2, is co
 of an argument that overflows are not asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product

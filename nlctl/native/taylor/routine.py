@@ -1,7 +1,5 @@
 """The routine that fills the Taylor coefficients of a diagram's solution, as machine code."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

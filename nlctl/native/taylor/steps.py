@@ -10,8 +10,6 @@ Rows are taken one after the other, of several members each as a vector, of a si
 at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from ..codegen.ir.functions import applied

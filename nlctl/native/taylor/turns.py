@@ -11,8 +11,6 @@ Where coefficients are not finite although the rates are, as those of the root o
 explicit pair has its turn whatever the method.
 """
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
 

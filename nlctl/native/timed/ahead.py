@@ -1,7 +1,5 @@
 """What is known before a run of the functions of time alone in a program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

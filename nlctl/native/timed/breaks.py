@@ -1,7 +1,5 @@
 """When conditions of time alone switch, to the last digit or to rounding."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Mapping, Sequence
 from functools import partial
 

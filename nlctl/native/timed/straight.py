@@ -1,7 +1,5 @@
 """Straight lines of t that blocks declare, as a fault's beginning: when they switch, by member."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ there is one definition of exp, sin and all others.  Nothing is contracted, what
 is, by the C library's ``fma``; so the values are those of portable machine code.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Functions of a program as C99: numbers, then loops with their sums, level by level."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 

@@ -8,8 +8,6 @@ units in the last place) and derives the polynomials: interpolation at the Cheby
 reduced range.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -3,8 +3,6 @@
 What is given lies in front of what results, as for every call; rows lie one behind the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from .text import Body, Value

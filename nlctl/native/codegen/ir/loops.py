@@ -5,8 +5,6 @@ together with those before them, so that no turn is shorter.  With several membe
 element of each, three to a round.
 """
 
-from __future__ import annotations
-
 from ....expressions.graph import Expr
 from ..plan import LoopOfLevel
 from .numbers import Writer, one_line

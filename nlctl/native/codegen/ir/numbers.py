@@ -1,7 +1,5 @@
 """Numbers of a function: each expression is one value."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection
 from typing import Any

@@ -7,8 +7,6 @@
 No two arrays overlap.  Each has a row per number and an entry per member in each row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 
 from ....expressions.graph import Expr

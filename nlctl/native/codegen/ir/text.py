@@ -5,8 +5,6 @@ of a batch or elements in a turn of a loop.  Text is written directly: objects f
 instruction would take ten times as long as all the rest.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
