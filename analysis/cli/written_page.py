@@ -13,7 +13,6 @@ from .printing import say
 
 if TYPE_CHECKING:
     from ..report.document import Claim, Report
-    from ..robustness.stl.spec import Requirement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +101,9 @@ def page_folder(name: str) -> Path:
 
 def compose_page(asked: AskedRun, live: bool | Sequence[str], required: Sequence[str]) -> Report:
     """Run a loop, check what can be checked of any, and compose its page."""
-    requirements = _requirements(required, asked.until)
+    from ..robustness.stl.spec import requirements_of
+
+    requirements = requirements_of([(text, "") for text in required], asked.until)
     if live:
         from nlctl.export.web import check_linker
 
@@ -140,17 +141,6 @@ def compose_page(asked: AskedRun, live: bool | Sequence[str], required: Sequence
         repeat=asked.command("simulate"),
     )
     return replace(page, verdict=f"{page.verdict} {in_sentences(every)}", headline=headline(every))
-
-
-def _requirements(texts: Sequence[str], until: float) -> list[Requirement]:
-    """Return requirements from texts as study files have them."""
-    from ..robustness.stl.spec import Requirement
-    from ..robustness.stl.text import parse_formula
-
-    return [
-        Requirement(key=f"R{k}", formula=parse_formula(text), until=until)
-        for k, text in enumerate(texts, start=1)
-    ]
 
 
 def live_words(live: bool | Sequence[str], required: Sequence[str] = ()) -> str:

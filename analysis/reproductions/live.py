@@ -1,6 +1,5 @@
 """The page of a paper that runs: each example with sliders, behind its figures."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +10,7 @@ from nlctl.response import input_output_response
 
 from ..pages.live import behind_figures, live_item, live_numbers, live_program, modules_together
 from ..report.document import Live, Report
-from ..robustness.stl.spec import Requirement
-from ..robustness.stl.text import parse_formula
+from ..robustness.stl.spec import requirements_of
 from .paper import MovedLoop, Paper
 
 
@@ -48,14 +46,7 @@ def _live(key: str, moved: MovedLoop) -> tuple[WebProgram, Live]:
     response = input_output_response(loop, times)
     program = live_program(loop, response, {})
     item = live_item(
-        program, response, moved.names, signals=moved.signals, requirements=_requirements(moved),
-        called=moved.call,
+        program, response, moved.names, signals=moved.signals, called=moved.call,
+        requirements=requirements_of(moved.requirements, moved.until),
     )  # fmt: skip
     return program, replace(item, key=key)
-
-
-def _requirements(moved: MovedLoop) -> Sequence[Requirement]:
-    return [
-        Requirement(key=f"R{k}", formula=parse_formula(text), meaning=meaning, until=moved.until)
-        for k, (text, meaning) in enumerate(moved.requirements, start=1)
-    ]

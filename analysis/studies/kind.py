@@ -12,14 +12,12 @@ Everything that a study does with an analysis (reading its table, checking it ag
 planning, running, claiming, drawing) it asks of this record and of nothing else.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import pandas as pd
@@ -29,14 +27,12 @@ from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 
+from ..report.document import Item
 from ..robustness import Design, Experiment, Prepared, Space
 from ..robustness.runs.progress import Progress
 from ..robustness.runs.sweep import Sweep
 from .file.schema import Asked, Study
 from .result import Finding, Result
-
-if TYPE_CHECKING:
-    from ..report.document import Item
 
 _NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
 

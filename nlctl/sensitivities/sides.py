@@ -6,6 +6,7 @@ from functools import cached_property, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, needed
+from ..native.equations.located import of_time_alone
 from .branches import Branch, branch_of
 from .directions import SomeRows
 from .source import EquationParts
@@ -112,7 +113,7 @@ def sides_of(source: EquationParts, first: int) -> KeptSides:
     behind = first + sum(size or 1 for size in sizes)
     memories = {m: graph.leaf("x", behind + k, None) for k, m in enumerate(source.program.memory)}
     before: dict[Expr, Expr] = {}
-    sides, timed = [], _timed([e for _, _, args in jumps for e in args])
+    sides, timed = [], of_time_alone(needed([e for _, _, args in jumps for e in args]))
     for (node, op, args), size in zip(jumps, sizes, strict=True):
         kept, first = graph.leaf("x", first, size), first + (size or 1)
         leaves = source.leaves(args, memories)
@@ -125,16 +126,3 @@ def sides_of(source: EquationParts, first: int) -> KeptSides:
         if node is not None:
             before[node] = there.value
     return KeptSides(source=source, sides=tuple(sides), memories=memories, before=before)
-
-
-def _timed(exprs: Sequence[Expr]) -> set[Expr]:
-    """Return which parts vary with t and with nothing else."""
-    timed: set[Expr] = set()
-    for node in needed(exprs):
-        is_time = node.op == "leaf" and node.data[0] == "t"
-        moved = [a for a in node.args if a.varies]
-        if is_time or (
-            moved and all(a in timed for a in moved) and node.op not in ("call", "solve")
-        ):
-            timed.add(node)
-    return timed

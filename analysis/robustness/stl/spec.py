@@ -39,6 +39,7 @@ from .formula import (
     margin_trace,
     signals_named,
 )
+from .text import parse_formula
 
 
 def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
@@ -187,6 +188,14 @@ class Spec:
     def limits(self) -> dict[str, list[Limit]]:
         """By signal what is always required: values, and from when to when (s); for figures."""
         return limits_of_requirements(self.requirements)
+
+
+def requirements_of(texts: Sequence[tuple[str, str]], until: float) -> list[Requirement]:
+    """Return requirements R1, R2, ... from texts as study files have them, and what they mean."""
+    return [
+        Requirement(key=f"R{k}", formula=parse_formula(text), meaning=meaning, until=until)
+        for k, (text, meaning) in enumerate(texts, start=1)
+    ]
 
 
 def violates(margins: ArrayLike) -> np.ndarray:

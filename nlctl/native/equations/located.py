@@ -1,10 +1,7 @@
 """What switches in the equations of a diagram, and what is a function of time alone there."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,9 +23,7 @@ from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
 from ..diagram.program import count_switching_functions, memory
-
-if TYPE_CHECKING:
-    from .reader import Reader
+from .reader import Reader
 
 _MOST = 256  # switching functions of one diagram; more cost more than they are worth
 _MOST_FREQUENCIES = 64  # in a product: of more it is a train of pulses rather than a wave
@@ -137,7 +132,7 @@ def found_conditions(
     roots = [*others, *_pieces([*rates, *declared]), *guarded, *solved]
     moving = needed(roots)
     nodes = needed([*roots, *watched]) if watched else moving
-    timed, inside = _of_time(nodes), set(nodes)
+    timed, inside = of_time_alone(nodes), set(nodes)
     known = {sign_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
     of_time: dict[Expr, tuple[Expr, ...]] = {}
@@ -204,7 +199,7 @@ def _with_levels(graph: Graph, function: Expr) -> Expr:
 
 
 def _is_of_time(function: Expr) -> bool:
-    return function in _of_time(needed([function]))
+    return function in of_time_alone(needed([function]))
 
 
 def _declared_of_time(
@@ -334,7 +329,7 @@ def sign_key(function: Expr) -> object:
     return function
 
 
-def _of_time(nodes: Sequence[Expr]) -> set[Expr]:
+def of_time_alone(nodes: Sequence[Expr]) -> set[Expr]:
     """Return which expressions vary with t and with nothing else."""
     moved: set[Expr] = set()  # by states, inputs, or what nobody knows
     timed: set[Expr] = set()
