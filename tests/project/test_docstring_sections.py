@@ -42,7 +42,7 @@ def test_what_is_returned_has_a_description(name, made):
     told = entries(made, "Returns") + entries(made, "Yields")
     assert [head for head, text in told if not text] == [], name
     returned = inspect.signature(made).return_annotation
-    returned = getattr(returned, "__name__", returned)  # of a class, or its name
+    returned = returned.__name__ if inspect.isclass(returned) else returned
     assert bool(told) == (returned not in (None, "None")), name
     if returned != "Any" and inspect.isclass(made.__globals__.get(returned)):
         assert returned in told[0][0], name
