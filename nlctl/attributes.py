@@ -94,7 +94,7 @@ class _Docstring:
 
     def __get__(self, instance: object, owner: type) -> str:
         if not self.whole:
-            entries = _entries(owner)
+            entries = "\n".join(_entry(*row) for row in _rows(owner))
             section = f"Attributes\n----------\n{entries}" if entries else ""
             self.whole = _with_section(self.text, section)
         return self.whole
@@ -116,11 +116,6 @@ def entries_by_field(cls: type) -> dict[str, list[str]]:
     """
     rows = [(names.split(", ")[0], names, kind, text) for names, kind, text in _rows(cls)]
     return {first: _entry(*row).splitlines() for first, *row in rows if row[2]}
-
-
-def _entries(cls: type) -> str:
-    """Return the entries of a class's own fields."""
-    return "\n".join(_entry(*row) for row in _rows(cls))
 
 
 def _entry(names: str, kind: str, text: str) -> str:

@@ -70,7 +70,8 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
     ...     pdf = write_pdf(page, Path(folder, "page.pdf"))  # doctest: +SKIP
     """
     browser = find_browser()
-    flags = [*FLAGS, "--no-sandbox"] if _is_root() else FLAGS
+    is_root = hasattr(os, "geteuid") and os.geteuid() == 0  # to whom Chromium refuses its sandbox
+    flags = [*FLAGS, "--no-sandbox"] if is_root else FLAGS
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         printed = Path(folder, "page.pdf")
         command = [
@@ -128,8 +129,3 @@ def _cpu_time(session: int) -> float:
 def open_page(page: str | os.PathLike[str]) -> bool:
     """Show a page in the user's browser; return whether there is one."""
     return webbrowser.open(Path(page).resolve().as_uri())
-
-
-def _is_root() -> bool:
-    """Whether Chromium would refuse its sandbox."""
-    return hasattr(os, "geteuid") and os.geteuid() == 0

@@ -80,7 +80,12 @@ def export_controller(
     ('x1', 'x2', 'yd', 'yd1', 'yd2')
     """
     part = _sampled_part(_block_of(diagram, block), dt, method)
-    alone = _alone(part)
+    inputs, outputs = list(part.input_labels), list(part.output_labels)
+    alone = ct.interconnect(
+        [part], name=part.name, inputs=inputs, outputs=outputs,
+        inplist=[f"{part.name}.{u}" for u in inputs],
+        outlist=[f"{part.name}.{y}" for y in outputs],
+    )  # fmt: skip
     compiled = with_every_float(native.compile(alone))
     clock = _clock_of(compiled, block)
     p = compiled.parameter_vector(_parameters_of(part, block, diagram, params or {}))
@@ -131,16 +136,6 @@ def _sampled_part(part: ct.NonlinearIOSystem, dt: float | None, method: str | No
             "time), or put nlctl.sampled(...) of it into the loop"
         )
     return sampled(part, number("export_controller", "dt", dt, above=0), method=method)
-
-
-def _alone(part: ct.NonlinearIOSystem) -> ct.InterconnectedSystem:
-    """Return a diagram of one block, with its inputs and outputs."""
-    inputs, outputs = list(part.input_labels), list(part.output_labels)
-    return ct.interconnect(
-        [part], name=part.name, inputs=inputs, outputs=outputs,
-        inplist=[f"{part.name}.{u}" for u in inputs],
-        outlist=[f"{part.name}.{y}" for y in outputs],
-    )  # fmt: skip
 
 
 def _clock_of(compiled: native.Compiled, block: str) -> Any:

@@ -156,16 +156,12 @@ def design(
         over = np.log(u / u_limit)
         return float(np.log(C_0) + 10 * over if over > 0 else np.log(C_0))
 
-    simplex = _simplex(read)
+    # logarithms of gamma, tau, b, beta, and of the two shares
+    start = np.log([1e4, 0.1, 0.1, read.law.beta, 1.0, 1.0])
+    simplex = np.vstack([start, start + np.diag([2.0, -0.7, -0.7, 0.3, -0.7, -0.7])])
     options = {"maxfev": evaluations, "initial_simplex": simplex}
     minimize(cost, simplex[0], method="Nelder-Mead", options=options)
     return _proved(loop, trials, u_limit, {"k": k, "u_max": u_max}, horizon)
-
-
-def _simplex(loop: KnownSignLoop) -> np.ndarray:
-    """Return the first simplex: logarithms of gamma, tau, b, beta, and of the two shares."""
-    start = np.log([1e4, 0.1, 0.1, loop.law.beta, 1.0, 1.0])
-    return np.vstack([start, start + np.diag([2.0, -0.7, -0.7, 0.3, -0.7, -0.7])])
 
 
 def _with_gains(

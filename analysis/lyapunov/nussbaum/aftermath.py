@@ -93,7 +93,10 @@ def aftermath(
     >>> bool(abs(I(low) - I(3.0)) < 1e-6 * found.wrong.budget)
     True
     """
-    low, high = _bounds(kG)
+    ends = as_numbers(kG)
+    if ends is None or ends.shape != (2,) or not 0 < ends[0] <= ends[1] < np.inf:
+        raise ParameterError(f"aftermath needs kG = (low, high) > 0, got {kG!r}")
+    low, high = float(ends[0]), float(ends[1])
     number("aftermath", "energy", energy, at_least=0)
     number("aftermath", "drag", drag, at_least=0)
     wrong = lobe_around(zeta, N)
@@ -114,14 +117,6 @@ def aftermath(
         peak=(float(np.sqrt(2 * max(least, 0.0))), float(np.sqrt(2 * highest))),
         rest=(first, last),
     )
-
-
-def _bounds(kG: object) -> tuple[float, float]:
-    """Return both ends of a range of gains."""
-    ends = as_numbers(kG)
-    if ends is None or ends.shape != (2,) or not 0 < ends[0] <= ends[1] < np.inf:
-        raise ParameterError(f"aftermath needs kG = (low, high) > 0, got {kG!r}")
-    return float(ends[0]), float(ends[1])
 
 
 def _still_gained(lobe: Lobe, N: GainFunction, kG: float, drag: float) -> float:

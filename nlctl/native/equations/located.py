@@ -193,13 +193,9 @@ def _factors_of_time(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
 def _with_levels(graph: Graph, function: Expr) -> Expr:
     """Return whether a guard, or what is watched, is above 0, if more than itself says so."""
     # Between two roots close by a product is hardly below 0, and a peak may be narrow.
-    if len(sign_factors(graph, function)) == 1 or _is_of_time(function):
+    if len(sign_factors(graph, function)) == 1 or function in of_time_alone(needed([function])):
         return function
     return graph.op("gt", function, graph.const(0.0))
-
-
-def _is_of_time(function: Expr) -> bool:
-    return function in of_time_alone(needed([function]))
 
 
 def _declared_of_time(
