@@ -75,28 +75,17 @@ def run_differences(first: Path, second: Path) -> list[str]:
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from nlctl.analysis.studies import origin_differences, read_study, run, run_differences
-    >>> text = '''
-    ... loop = "nlctl:block"
-    ... options = { spec = { block = "Lag" }, name = "lag" }
-    ... study = { title = "A lag", seed = 1 }
-    ... space."lag.T" = { bounds = [0.05, 0.4] }
-    ... inputs.u = 1.0
-    ... spec.rises = "always from 1 s on v >= 0.9"
-    ... time = { end = 1.2, step = 0.1 }
-    ... runs.size = 20
-    ... analysis = [{ kind = "probability" }]
-    ... '''
+    >>> from nlctl.analysis.studies import origin_differences, read_study, run
+    >>> from nlctl.analysis.studies import run_differences, shipped
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     one, other = Path(folder, "one"), Path(folder, "other")
-    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
-    ...     _ = run(read_study(Path(folder, "lag.toml")), one)
-    ...     _ = run(read_study(Path(folder, "lag.toml"), ["inputs.u=0.8"]), other)
+    ...     _ = run(read_study(shipped("lag")), one)
+    ...     _ = run(read_study(shipped("lag"), ["inputs.u=0.8"]), other)
     ...     found, reason = run_differences(one, other), origin_differences(one, other)
     >>> reason
     '[inputs] of the study'
     >>> print(found[1])
-    findings.probability.numbers.violations was 0, now 20
+    holds was True, now False
     """
     contents, one, other = [], load_result(first), load_result(second)
     for folder in (first, second):

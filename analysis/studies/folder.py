@@ -117,21 +117,9 @@ def verify(folder: str | Path) -> Integrity:
     >>> import shutil
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from nlctl.analysis.studies import read_study, run, verify
-    >>> text = '''
-    ... loop = "nlctl:block"
-    ... options = { spec = { block = "Lag" }, name = "lag" }
-    ... study = { title = "A lag", seed = 1 }
-    ... space."lag.T" = { uniform = [0.05, 0.4] }
-    ... inputs.u = 1.0
-    ... spec.rises = "always from 1 s on v >= 0.9"
-    ... time = { end = 1.2, step = 0.1 }
-    ... runs.size = 20
-    ... analysis = [{ kind = "probability", limit = 0.3 }]
-    ... '''
+    >>> from nlctl.analysis.studies import read_study, run, shipped, verify
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
-    ...     _ = run(read_study(Path(folder, "lag.toml")), Path(folder, "run"))
+    ...     _ = run(read_study(shipped("lag")), Path(folder, "run"))
     ...     before = verify(Path(folder, "run"))
     ...     shutil.rmtree(Path(folder, "run", "probability"))
     ...     after = verify(Path(folder, "run"))

@@ -54,23 +54,9 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
 
     Examples
     --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from nlctl.analysis.studies import plan, read_study
-    >>> text = '''
-    ... loop = "nlctl:block"
-    ... options = { spec = { block = "Lag" }, name = "lag" }
-    ... study = { title = "A lag", seed = 1 }
-    ... space."lag.T" = { uniform = [0.05, 0.4] }
-    ... inputs.u = 1.0
-    ... spec.rises = "always from 1 s on v >= 0.9"
-    ... time = { end = 1.2, step = 0.1 }
-    ... runs.size = 20
-    ... analysis = [{ kind = "probability" }, { kind = "worst case", runs = 40 }]
-    ... '''
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
-    ...     expected = plan(read_study(Path(folder, "lag.toml")))
+    >>> from nlctl.analysis.studies import plan, read_study, shipped
+    >>> asked = "analysis=[{ kind = 'probability' }, { kind = 'worst case', runs = 40 }]"
+    >>> expected = plan(read_study(shipped("lag"), [asked]))
     >>> expected.runs, expected.total
     ({'rows': 20, 'worst-case': 40}, 60)
     >>> expected.at_most, expected.seconds < 60

@@ -114,26 +114,15 @@ def run(
 
     Examples
     --------
-    A lag is above 0.9 one second after a step, whatever T up to 0.4 s: none of 20 runs violates
-    that, and the bound of the probability is 1 - 0.01^(1/20) with a confidence of 99 %.
+    The lag T v' = u - v is above 0.9 one second after a step, whatever T up to 0.4 s: none of 20
+    runs violates that, and the bound of the probability is 1 - 0.01^(1/20) with a confidence of
+    99 %.
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from nlctl.analysis.studies import load_result, read_study, run
-    >>> text = '''
-    ... loop = "nlctl:block"
-    ... options = { spec = { block = "Lag" }, name = "lag" }  # T v' = u - v
-    ... study = { title = "A lag", seed = 1 }
-    ... space."lag.T" = { uniform = [0.05, 0.4] }
-    ... inputs.u = 1.0
-    ... spec.rises = "always from 1 s on v >= 0.9"
-    ... time = { end = 1.2, step = 0.1 }
-    ... runs.size = 20
-    ... analysis = [{ kind = "probability", limit = 0.3 }]
-    ... '''
+    >>> from nlctl.analysis.studies import load_result, read_study, run, shipped
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
-    ...     result = run(read_study(Path(folder, "lag.toml")), Path(folder, "run"))
+    ...     result = run(read_study(shipped("lag")), Path(folder, "run"))
     ...     again = load_result(Path(folder, "run"))
     >>> found = result["probability"].numbers
     >>> found["violations"], round(found["upper"], 4), round(1 - 0.01 ** (1 / 20), 4)
