@@ -1,4 +1,4 @@
-"""The report of the paper, from Python: what ``nlctl report`` writes, and each of its three parts.
+"""The report of the paper, from Python: what ``nlctl report`` writes.
 
 In a notebook::
 
@@ -26,7 +26,6 @@ from ..robustness.runs.store import parquet
 from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
 from . import evidence as proofs
-from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
 from .reproduction import CASES, HORIZON, checks, numerics
@@ -48,22 +47,6 @@ class _Here(Executor):
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
-
-
-def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
-    """Run both examples, and return the report's first part: their figures and numbers."""
-    with watch("simulating", len(CASES)) as advance:
-        runs = simulate_cases(CASES, advance)
-    return paper_sections(runs)
-
-
-def proof(
-    horizon: float = HORIZON,
-    far: proofs.FarRuns = proofs.NO_FAR_RUNS,
-    watch: ProgressWatch = unwatched,
-) -> list[Section]:
-    """Check the proof for both examples, and return the report's second part."""
-    return lyapunov_sections(_proved(horizon, watch), far)
 
 
 def robustness(

@@ -6,7 +6,9 @@ import pytest
 from studies_example import write
 
 from nlctl.analysis.paper import CASES
-from nlctl.analysis.paper.report import clear, compose, proof, reproduction, robustness
+from nlctl.analysis.paper.page.report import paper_sections
+from nlctl.analysis.paper.report import clear, compose, robustness
+from nlctl.analysis.reproductions.paper import simulate_cases
 from nlctl.analysis.studies import RunFolderError, read_study, run
 
 
@@ -78,15 +80,8 @@ def test_the_whole_begins_with_the_reproduction(tmp_path):
     assert watched.totals["simulating"] == len(CASES)
     assert made.passed
     keys = [section.key for section in made.report.sections]
-    first = [section.key for section in reproduction()]
+    first = [section.key for section in paper_sections(simulate_cases(CASES))]
     assert keys[: len(first) + 1] == [*first, "proof"]
+    assert {key.rpartition("-")[2] for key in keys[len(first) + 1 :]} >= {"1", "2"}
     assert not any(key.startswith("robustness") for key in keys)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.weekly
-def test_the_proof_is_a_part():
-    """Both examples have their sections, along whatever run it is checked."""
-    keys = [section.key for section in proof(2.0)]
-    assert keys[0] == "proof"
-    assert {key.rpartition("-")[2] for key in keys[1:]} >= {"1", "2"}
