@@ -1,7 +1,5 @@
 """Functions in a pickle: by name where others can import them, by value where they cannot."""
 
-from __future__ import annotations
-
 import pickle
 from typing import Any
 
@@ -26,7 +24,7 @@ class ByValue:
                 f"({error}); a function of a module, whose globals stay there, can be"
             ) from error
 
-    def __deepcopy__(self, memo: object) -> ByValue:
+    def __deepcopy__(self, memo: object) -> "ByValue":
         return self
 
 

@@ -5,8 +5,6 @@ through a function of a user's, floats inside of these balls go through it as we
 comes out has to lie in what the balls gave.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -192,7 +190,7 @@ def _compare(
 def _compare_quotients(
     function: Any,
     arguments: Sequence[Any],
-    point: _Point,
+    point: "_Point",
     results: Sequence[Any],
     refusal: _Refusal,
 ) -> None:

@@ -1,7 +1,5 @@
 """Boxes: the compact sets over which constants are proved, given or visited by trajectories."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Literal
 
@@ -38,7 +36,7 @@ class Box:
     how: str = "given"  # Where the box comes from.
 
     @classmethod
-    def of(cls, **sides: tuple[float, float]) -> Box:
+    def of(cls, **sides: tuple[float, float]) -> "Box":
         """Make a box of its sides, ``Box.of(x1=(-1, 1), v=(-12, 6))``.
 
         Parameters
@@ -81,7 +79,7 @@ class Box:
         return self.low[i], self.high[i]
 
     @as_annotated
-    def only(self, *names: str) -> Box:
+    def only(self, *names: str) -> "Box":
         """Return the box of some of the sides, in the order given.
 
         Parameters
@@ -98,7 +96,7 @@ class Box:
         return dataclasses.replace(self, names=names, low=low, high=high)
 
     @as_annotated
-    def times(self, name: str, low: float, high: float) -> Box:
+    def times(self, name: str, low: float, high: float) -> "Box":
         """Return the product of the box with one more side.
 
         Parameters

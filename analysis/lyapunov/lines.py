@@ -1,7 +1,5 @@
 """Lines of the ledger: how a statement was judged, how that is known, and what follows."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Literal
 
@@ -72,7 +70,7 @@ class Line:
     replay: str = ""  # Options of the command line that repeat that run.
     runs: int = 1  # Number of runs behind the line.
 
-    def worse_of(self, other: Line | None) -> Line:
+    def worse_of(self, other: "Line | None") -> "Line":
         """Return the line with the worse status, or the smaller least margin.
 
         Parameters

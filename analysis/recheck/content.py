@@ -1,7 +1,5 @@
 """What the file of a certificate holds, and the answer no."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -47,7 +45,7 @@ class Record:
         need(name in self.content, f"{self.where} has no {name}")
         return self.content[name]
 
-    def record(self, name: str) -> Record:
+    def record(self, name: str) -> "Record":
         """Return a record in this one."""
         return Record(self[name], name)
 

@@ -1,7 +1,5 @@
 """Which claims of a report changed in another one, which drawings, and which signals: as data."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math
@@ -274,7 +272,7 @@ class Curves:
     unit: str = ""
     bands: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
-    def largest_difference(self, other: Curves, name: str) -> tuple[float, float]:
+    def largest_difference(self, other: "Curves", name: str) -> tuple[float, float]:
         """Return how far a signal is from the same of another run at most (1), and when (s)."""
         start, end = max(self.time[0], other.time[0]), min(self.time[-1], other.time[-1])
         every = np.union1d(self.time, other.time)

@@ -1,7 +1,5 @@
 """Friction as a force law of velocity, from Coulomb's to LuGre, and Bouc-Wen's hysteresis."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..equations import equation
@@ -24,7 +22,7 @@ def bristle_rate(z, velocity, p):
     return velocity - p.sigma_0 * np.abs(velocity) * z / stribeck_level(velocity, p)
 
 
-def check_levels(spec: LuGre | Stribeck | StickSlip) -> None:
+def check_levels(spec: "LuGre | Stribeck | StickSlip") -> None:
     """Friction at rest is not below that of motion."""
     if not spec.F_c <= spec.F_s:
         raise ParameterError(

@@ -5,8 +5,6 @@ every block, and wins over each block's own values.  `with_own_values` gives the
 values of their own, and `apart` gives a run a diagram of its own.
 """
 
-from __future__ import annotations
-
 import copy
 import functools
 import operator
@@ -141,7 +139,7 @@ def _lacks_own(block: ct.NonlinearIOSystem) -> bool:
     return bool(block.params) and all(isinstance(k, str) and "." not in k for k in block.params)
 
 
-def _named(system: Any, given: Apart) -> Any:
+def _named(system: Any, given: "Apart") -> Any:
     if isinstance(system, ct.InterconnectedSystem):
         return _named_diagram(system, [_named(part, given) for part in system.syslist])
     block = within(system)

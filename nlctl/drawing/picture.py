@@ -4,8 +4,6 @@
 `draw` paints it.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -166,7 +164,7 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
 @as_annotated
 def draw(
     diagram: ct.InterconnectedSystem, *, title: str | None = None, expand: bool = False
-) -> Drawing:
+) -> "Drawing":
     """Draw a block diagram, in the order of the signal flow from left to right.
 
     Signals between the same two blocks share an arrow; ``-y`` and ``2 y`` carry their gain.

@@ -6,8 +6,6 @@ To resolve them is python-control's work, block by block.  A run whose diagram i
 the run before takes what was resolved then.
 """
 
-from __future__ import annotations
-
 import operator
 import threading
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -126,7 +124,7 @@ class Reading:
         """Return the vector `p` of shape (k,) that the program takes."""
         return self.resolved(params).p.copy()
 
-    def resolved(self, params: Mapping[str, Any] | None = None) -> Resolved:
+    def resolved(self, params: Mapping[str, Any] | None = None) -> "Resolved":
         """Return what a run takes of the diagram as it is now."""
         given = [*(params or {}), *(params or {}).values()]
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks

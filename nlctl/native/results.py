@@ -1,7 +1,5 @@
 """What became of a run: statistics, and the times that were reached."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -89,7 +87,7 @@ class Trajectory:
         begin = self.time[:1]  # there a history ends
         return jump_times(np.concatenate([self.due, begin, self.happened.time]), self.leaving)
 
-    def cut_short(self, cut: frozenset[tuple[int, str]]) -> Trajectory:
+    def cut_short(self, cut: frozenset[tuple[int, str]]) -> "Trajectory":
         """Return it with the functions of which a loop may have ended it, if one may."""
         ended = self.statistics.status in (Status.DIVERGED, Status.STEP_TOO_SMALL)
         return replace(self, cut=cut) if ended else self

@@ -1,7 +1,5 @@
 """When sampled blocks sample, and when their outputs follow."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -116,7 +114,7 @@ def meetings(clocks: Clocks) -> list[frozenset[Moment]]:
     return [what for what, _ in combined]
 
 
-def _meet(one: _Series, other: _Series) -> bool:
+def _meet(one: "_Series", other: "_Series") -> bool:
     if one.jitter or other.jitter:
         return False  # they would by chance, which has the probability 0
     return (one.start - other.start) % _common(one.dt, other.dt) == 0

@@ -1,7 +1,5 @@
 """Sampled blocks: discrete time in a diagram of continuous time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -123,7 +121,7 @@ class Sampled(Around):
             dict.pop(theirs, name)
         return {k.removeprefix(prefix): v for k, v in ours.items()}, theirs
 
-    def copy(self, name: str | None = None, use_prefix_suffix: bool = True) -> Sampled:
+    def copy(self, name: str | None = None, use_prefix_suffix: bool = True) -> "Sampled":
         """Return a copy, whose parameters have its name in front; it has the same clock."""
         inner = self.inner.copy(name=name, use_prefix_suffix=use_prefix_suffix)
         sampling = self.sampling

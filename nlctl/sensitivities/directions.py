@@ -1,7 +1,5 @@
 """Directions in which equations are differentiated: of states, time, inputs and parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -23,7 +21,7 @@ class When:
     happens: Expr  # whether anything happens at a time that moves
     met: Expr  # whether anything has been met at a rate
 
-    def unless(self, condition: Expr, other: When, graph: Graph) -> When:
+    def unless(self, condition: Expr, other: "When", graph: Graph) -> "When":
         """Return this, or another if a condition holds."""
 
         def either(one: Expr, two: Expr) -> Expr:

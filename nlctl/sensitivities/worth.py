@@ -1,7 +1,5 @@
 """What values of gains are worth: margins and a cost of runs with them, and their derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -58,7 +56,7 @@ class TuningProblem:
         """The same without rows."""
         return tuple(tuple(p for row in rows for p in row) for rows in self.rows)
 
-    def with_samples(self, many: int) -> TuningProblem:
+    def with_samples(self, many: int) -> "TuningProblem":
         """Return the same runs with so many times as many samples."""
         times = self.times
         parts = np.arange(many * (times.size - 1) + 1) / many
@@ -142,7 +140,7 @@ class Worth:
         """The cost where there is one, else the least margin."""
         return self.cost if self.has_cost else self.least
 
-    def is_as_good_as(self, other: Worth, tolerance: float) -> bool:
+    def is_as_good_as(self, other: "Worth", tolerance: float) -> bool:
         """Whether it is no worse than another one, but for a part of a margin or of a cost."""
         room = tolerance * np.array([1.0 + abs(other.least), abs(other.rank[1])])
         return bool(np.all(np.array(self.rank) >= np.array(other.rank) - np.nan_to_num(room)))

@@ -1,7 +1,5 @@
 """A barrier: a function that no trajectory from a set of starts carries above 0, proved."""
 
-from __future__ import annotations
-
 import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -164,7 +162,7 @@ class _SetInBox:
     inside: Expr | None = None
 
     @staticmethod
-    def of(one: Any, box: Box) -> _SetInBox:
+    def of(one: Any, box: Box) -> "_SetInBox":
         """Read a set that somebody has given."""
         if not callable(one):
             return _SetInBox(box=one)

@@ -8,8 +8,6 @@ argument that is least now is taken, of every largest one all arguments: a linea
 convex-concave procedure, Yuille, Rangarajan, Neural Computation 15, 2003), repeated while it gains.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -116,7 +114,7 @@ class _Atoms:
     value: np.ndarray
 
     @property
-    def opposite(self) -> _Atoms:
+    def opposite(self) -> "_Atoms":
         return replace(self, factor=-self.factor, value=-self.value)
 
 

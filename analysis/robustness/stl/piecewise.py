@@ -4,8 +4,6 @@ The trace of a formula is one: signals are connected by lines between samples, a
 and windows of piecewise linear functions are piecewise linear again, so nothing is lost on the way.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +21,7 @@ class Trace:
     y: np.ndarray  # (m,)
     jump: float = 0.0  # an interval (s) that is not longer is a jump: only its ends are values
 
-    def __neg__(self) -> Trace:
+    def __neg__(self) -> "Trace":
         return Trace(self.t, -self.y, self.jump)
 
     def at(self, t: np.ndarray) -> np.ndarray:
@@ -35,7 +33,7 @@ class Trace:
             values = np.where(jumps, self.y[k], values)
         return values
 
-    def between(self, low: float, high: float) -> Trace:
+    def between(self, low: float, high: float) -> "Trace":
         """The part with low <= t <= high."""
         i, j = np.searchsorted(self.t, low, "right"), np.searchsorted(self.t, high, "left")
         ends = np.array([low, high] if low < high else [low])
@@ -43,7 +41,7 @@ class Trace:
         t = np.concatenate([ends[:1], self.t[i:j], ends[1:]])
         return Trace(t, np.concatenate([first, self.y[i:j], last]), self.jump)
 
-    def refined(self, t: np.ndarray) -> Trace:
+    def refined(self, t: np.ndarray) -> "Trace":
         """The same function with more points."""
         if t is self.t:
             return self

@@ -10,8 +10,6 @@ Each of many has fewer kinks than all of them together: which time and which bou
 only within a piece.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -127,7 +125,7 @@ class Requirement:
         return signals_named(self.formula)
 
     @property
-    def parts(self) -> tuple[tuple[Requirement, ...], ...]:
+    def parts(self) -> "tuple[tuple[Requirement, ...], ...]":
         """Requirements whose least margin is that of this one: a row for each bound of a window.
 
         In a row are pieces of the window: which time decides changes less often in a piece, so

@@ -1,7 +1,5 @@
 """The probability of a violation against the size of the uncertainty."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -39,7 +37,7 @@ class AskedDegradation(Varied):
     claimed: ClassVar[str] = "a violation has at most probability {limit:g} at the size {at:g}"
 
     @model_validator(mode="after")
-    def _at_is_looked_at(self) -> AskedDegradation:
+    def _at_is_looked_at(self) -> "AskedDegradation":
         if self.limit is not None and self.at not in self.factors:
             raise ValueError(f"the claim is about size {self.at:g}, which is not among the factors")
         return self

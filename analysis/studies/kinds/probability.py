@@ -1,7 +1,5 @@
 """Exact bounds of the probability of a violation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
@@ -34,7 +32,7 @@ class Probability(Asked):
     claimed: ClassVar[str] = "a violation has at most probability {limit:g}"
 
     @model_validator(mode="after")
-    def _needs_upper(self) -> Probability:
+    def _needs_upper(self) -> "Probability":
         if self.side == "lower" and self.limit is not None:
             raise ValueError("a limit needs side = 'upper' or 'both', got 'lower'")
         return self

@@ -6,8 +6,6 @@ vectors; the sums of a loop are numbers of the next level.  A vector is computed
 in one loop; one that is used in several, or element by element, lies in memory.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,7 +43,7 @@ class FunctionPlan:
     rows: int  # rows of memory that are taken, those before included
 
     @cached_property
-    def levels(self) -> tuple[Level, ...]:
+    def levels(self) -> "tuple[Level, ...]":
         """The levels, in order."""
         inner: dict[_Loop, list[Store]] = {}
         for store in self.stores:

@@ -1,7 +1,5 @@
 """A block of a diagram, as everything that reads the diagram sees it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +28,7 @@ class Slide:
         block, what = self.what
         return f"{what} of block '{block}'"
 
-    def shares(self, other: Slide) -> bool:
+    def shares(self, other: "Slide") -> bool:
         """Whether it has a condition that another one has."""
         apart = set(self.places).isdisjoint(other.places)
         return not (apart and set(self.declared).isdisjoint(other.declared))

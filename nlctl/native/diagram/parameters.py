@@ -1,7 +1,5 @@
 """Where every parameter lies in the one flat vector that a program takes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +30,7 @@ class Slot:
         """How many entries of the vector it takes."""
         return math.prod(self.shape)
 
-    def moved(self, by: int) -> Slot:
+    def moved(self, by: int) -> "Slot":
         """Return the same, `by` places later."""
         return replace(self, offset=self.offset + by)
 

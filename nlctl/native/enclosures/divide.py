@@ -1,7 +1,5 @@
 """Claims and suprema when boxes are divided in machine code."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -113,7 +111,7 @@ class _Search:
                 return self.status
             self.stack = np.concatenate([self.stack, np.empty_like(self.stack)])
 
-    def verdict(self, parts: list[_Search]) -> BoxVerdict:
+    def verdict(self, parts: "list[_Search]") -> BoxVerdict:
         """Return what was found, by this search and by others that went on with its boxes."""
         # The first that is refuted counts, and those before it.
         every = [self, *parts]

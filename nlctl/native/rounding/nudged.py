@@ -6,8 +6,6 @@ and in random directions, and the results show what such rounding may do: a runn
 by sampling (Parker, Pierce, Eggert 2000, Monte Carlo arithmetic).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
@@ -31,7 +29,7 @@ class Shaken(np.ndarray):
     drawn: np.random.Generator | None  # where the directions are from; None for no change
 
     @classmethod
-    def of(cls, values: object, drawn: np.random.Generator | None) -> Shaken:
+    def of(cls, values: object, drawn: np.random.Generator | None) -> "Shaken":
         """Return values as such an array."""
         shaken = np.array(values, dtype=float).view(cls)
         shaken.drawn = drawn

@@ -1,7 +1,5 @@
 """Functions of time that are pieces of straight lines, and where they switch."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -31,14 +29,14 @@ class Lines:
         """Where the pieces end (s)."""
         return np.append(self.starts[1:], self.end)
 
-    def at(self, starts: np.ndarray) -> Lines:
+    def at(self, starts: np.ndarray) -> "Lines":
         """Return the same with pieces that begin at `starts`, its own among them."""
         k = np.searchsorted(self.starts, starts, side="right") - 1
         with np.errstate(all="ignore"):  # a piece that nothing chooses may be a division by 0
             values = self.values[k] + self.slopes[k] * (starts - self.starts[k])
         return Lines(starts=starts, values=values, slopes=self.slopes[k], end=self.end)
 
-    def divided(self, at: np.ndarray) -> Lines:
+    def divided(self, at: np.ndarray) -> "Lines":
         """Return the same, with more pieces."""
         inner = at[(at > self.starts[0]) & (at < self.end)]
         starts = np.union1d(self.starts, inner)
