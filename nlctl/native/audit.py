@@ -32,9 +32,9 @@ from ..upstream.control_internals import outputs_now, rates_now, set_parameters
 from .codegen.solver import searched
 from .compiled import Compiled
 from .declared import declared_labels, declared_now, declared_rows, without_nan
-from .diagram.block_inputs import block_inputs
 from .diagram.program import instants_of
 from .diagram.schedule import Schedule, Signal, signal_name
+from .diagram.wiring import block_inputs
 from .equations.blocks import equations
 from .equations.relays import relay_places
 from .lower import lower

@@ -12,8 +12,8 @@ from ...upstream.control_internals import rates_now
 from ...upstream.systems import System
 from ..audit import every_output
 from ..compiled import Compiled
-from ..diagram.block_inputs import block_inputs
 from ..diagram.program import count_switching_functions, memory
+from ..diagram.wiring import block_inputs
 from ..equations.relays import relay_places
 from ..happened import row_labels
 from .steps import Jump
