@@ -3,7 +3,7 @@
 from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
 from .adaptive_inverse import AdaptiveDeadZoneInverse
-from .backstepping.dynamic_surface import DynamicSurface, dynamic_surface_control
+from .dynamic_surface import DynamicSurface, dynamic_surface_control
 from .extremum_seeking import ExtremumSeeking
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
@@ -17,8 +17,7 @@ from .mrac.modified_weights import EModifiedWeights, ProjectedWeights
 from .mrac.reference_model import ReferenceModel
 from .mrac.regressors import AffineRegressor, LinearRegressor, WingRockRegressor
 from .nussbaum import NussbaumLaw
-from .performance.funnel import FunnelControl
-from .performance.prescribed import PrescribedPerformance
+from .performance import FunnelControl, PrescribedPerformance
 from .pid import PID, PID2, standard_pid
 from .rbf import (
     AdaptiveWeights,
@@ -29,7 +28,7 @@ from .rbf import (
 )
 from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
-from .sliding_modes.boundary_layer import SlidingModeLaw, SuperTwistingLaw, sliding_mode
+from .sliding_modes import SlidingModeLaw, SuperTwistingLaw, sliding_mode
 
 __all__ = [
     "PID",

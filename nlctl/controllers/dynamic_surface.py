@@ -3,14 +3,14 @@
 import control as ct
 import numpy as np
 
-from ...annotations import as_annotated
-from ...diagrams import interconnect
-from ...equations import equation
-from ...errors import ParameterError
-from ...params import Floats, param, record
-from ...plants import coordinate_names
-from ..mrac.laws import ModelReferenceLaw
-from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
+from ..annotations import as_annotated
+from ..diagrams import interconnect
+from ..equations import equation
+from ..errors import ParameterError
+from ..params import Floats, param, record
+from ..plants import coordinate_names
+from .mrac.laws import ModelReferenceLaw
+from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
 
 
 @equation

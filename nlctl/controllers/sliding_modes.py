@@ -3,12 +3,12 @@
 import control as ct
 import numpy as np
 
-from ...annotations import as_annotated
-from ...diagrams import as_system, interconnect
-from ...equations import equation
-from ...functions import clip
-from ...params import param, record
-from ..filtered_error import FilteredError
+from ..annotations import as_annotated
+from ..diagrams import as_system, interconnect
+from ..equations import equation
+from ..functions import clip
+from ..params import param, record
+from .filtered_error import FilteredError
 
 
 @record

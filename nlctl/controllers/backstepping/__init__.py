@@ -1,1 +1,0 @@
-"""Backstepping without derivatives of virtual controls: dynamic surface control."""
