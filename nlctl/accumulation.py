@@ -11,6 +11,8 @@ become shorter as well: a geometric sequence, or one as 1 / n^2, but none as 1 /
 asked at each jump, by machine code too.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -17,6 +17,8 @@
 - the settings in `SETTINGS`, and ``DISABLE_JIT``.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,5 +1,7 @@
 """Calls of a function of which only the address is known: compiled once for all programs."""
 
+from __future__ import annotations
+
 import inspect
 from collections.abc import Callable
 from typing import Any

@@ -12,6 +12,8 @@ Relied on in the IR that numba makes, and held by a test each:
   ``NRT_MemInfo_call_dtor``; `_MEMORY` has both in terms of the C library, with numba's layout.
 """
 
+from __future__ import annotations
+
 import lzma
 import re
 from collections.abc import Iterable, Sequence
