@@ -84,8 +84,6 @@ def loop_report(
     --------
     A page of one's own loop, and what of it the page says:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.loop_report import loop_report
     >>> loop = nlctl.actuators.cascade({"zone": nlctl.DeadZone(), "lag": nlctl.Lag()})
     >>> run = nlctl.input_output_response(loop, np.linspace(0, 1, 101), 1.0)

@@ -299,7 +299,6 @@ def block(
 
     Examples
     --------
-    >>> import nlctl
     >>> actuator = nlctl.block(nlctl.DeadZone(b_r=0.6), "actuator")
     >>> print(actuator.params["actuator.b_r"], actuator.output(0, [], [0.4]))
     0.6 [0.]

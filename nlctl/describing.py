@@ -83,7 +83,6 @@ def describing_function(
     --------
     Of a relay its magnitude is 4 / (pi A); a play lags:
 
-    >>> import numpy as np
     >>> relay = nlctl.block(nlctl.Relay(on=0.5, off=-0.5), "relay")
     >>> bool(np.isclose(abs(nlctl.describing_function(relay, 2.0)), 4 / (np.pi * 2.0)))
     True

@@ -97,7 +97,6 @@ class FilteredStep(_Reference):
     --------
     A filter of order 1 with omega = 2 rad/s:
 
-    >>> import numpy as np
     >>> reference = nlctl.block(nlctl.FilteredStep(order=0, omega=2.0), "reference")
     >>> response = nlctl.input_output_response(reference, np.array([0.0, 0.5]))
     >>> print(round(response.outputs[0, -1], 6), round(1 - np.exp(-1), 6))

@@ -147,8 +147,6 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import visited_box
     >>> response = nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 1, 101))
     >>> box = visited_box(response, margin=0.0)

@@ -136,7 +136,6 @@ def conservatism(
     --------
     C_0^2 / 2 is the sum of its terms:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import conservatism
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> found = conservatism(nlctl.paper.example_1(controller=controller), 0.2)

@@ -160,8 +160,6 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     --------
     sin(0.1 t) of Example 2, for all time:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, disturbance
     >>> box = Box(names=("x1", "x2", "x3"), low=(-1.0,) * 3, high=(1.0,) * 3)
     >>> found = disturbance(nlctl.plants.Genesio(), box, (0.0, np.inf))
@@ -427,8 +425,6 @@ def literal(given: Premises, constants: Constants, plant: object = None) -> Prem
     --------
     What leaves the disturbance comes back as an error of the network:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, constants, literal, premises
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> loop = nlctl.paper.example_1(controller=controller)

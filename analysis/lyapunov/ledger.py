@@ -173,7 +173,6 @@ def ledger(
     --------
     Without the network, which leaves little to be bounded, over a fifth of a second:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import examine, ledger
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> found = examine(nlctl.paper.example_1(controller=controller), 0.2)

@@ -137,7 +137,6 @@ def tighten(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import tighten
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> loop = nlctl.paper.example_1(controller=controller)

@@ -60,7 +60,6 @@ def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     --------
     A parabola's vertex is found exactly, a clipped one has the limit as its largest value:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import highest
     >>> t = np.linspace(-1.0, 1.0, 9)
     >>> y = 1 - (t - 0.1) ** 2
@@ -91,7 +90,6 @@ def lowest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import lowest
     >>> t = np.linspace(-1.0, 1.0, 9)
     >>> round(lowest(t, (t - 0.1) ** 2 - 1), 9)
@@ -111,7 +109,6 @@ def spread(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import spread
     >>> t = np.linspace(0.0, 2 * np.pi, 1001)
     >>> round(spread(t, 3 * np.sin(t)), 6)
@@ -131,7 +128,6 @@ def peak(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import peak
     >>> peak(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
     3.0
@@ -159,7 +155,6 @@ def ultimate_bound(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import ultimate_bound
     >>> t = np.linspace(0.0, 4.0, 401)
     >>> print(round(ultimate_bound(t, np.exp(-t)), 6), round(np.exp(-3), 6))
@@ -180,7 +175,6 @@ def final(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import final
     >>> final(np.array([0.0, 1.0]), np.array([5.0, 7.0]))
     7.0

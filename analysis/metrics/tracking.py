@@ -29,7 +29,6 @@ class Metric:
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import Metric, peak
     >>> effort = Metric(key="peak_u", signal="u", unit="1", meaning="largest input", function=peak)
     >>> effort.signals, effort.function(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
@@ -82,7 +81,6 @@ def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.nda
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import over
     >>> t = np.linspace(0.0, 1.0, 5)
     >>> print(*over(t, t**2, 0.4, 1.0))
@@ -136,7 +134,6 @@ def tracking_metrics(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import tracking_metrics
     >>> metrics = {metric.key: metric for metric in tracking_metrics(start=1.0, band=0.1)}
     >>> times = np.linspace(0.0, 2 * np.pi, 1001)
@@ -202,7 +199,6 @@ def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import in_machine_code, integral
     >>> t = np.array([0.0, 0.5, 1.0])
     >>> round(in_machine_code(integral)(t, t**2), 12)

@@ -24,7 +24,6 @@ def total_variation(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = No
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import total_variation
     >>> total_variation(np.arange(4.0), np.array([0.0, 2.0, 1.0, 1.0]))
     3.0
@@ -53,7 +52,6 @@ def settling_time(t: np.ndarray, y: np.ndarray, band: float, breaks: np.ndarray 
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import settling_time
     >>> t = np.linspace(0.0, 5.0, 5001)
     >>> print(round(settling_time(t, np.exp(-t), 0.05), 4), round(np.log(20), 4))
@@ -94,7 +92,6 @@ def time_within(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import time_within
     >>> time_within(np.array([0.0, 1.0]), np.array([-1.0, 1.0]), -0.5, 0.25)
     0.375
@@ -129,7 +126,6 @@ def reversals(t: np.ndarray, y: np.ndarray, above: float = 0.0, breaks: np.ndarr
     --------
     Swings of 0.1 on the way do not count as reversals here:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import reversals
     >>> y = np.array([0.0, 1.0, 0.9, 2.0, 0.0])
     >>> reversals(np.arange(5.0), y), reversals(np.arange(5.0), y, 0.2)

@@ -54,7 +54,6 @@ def recheck(content: Any) -> str:
 
     >>> import json, tempfile
     >>> from pathlib import Path
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import certify
     >>> from nlctl.analysis.recheck import recheck, seal_of
     >>> controller = nlctl.sliding_mode(law=nlctl.controllers.SlidingModeLaw(K=20.0, phi=0.1))

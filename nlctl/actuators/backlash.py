@@ -61,7 +61,6 @@ class Backlash(Remembering):
     --------
     Its output follows u half a gap behind, and holds where u reverses:
 
-    >>> import numpy as np
     >>> gap = nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.5), "actuator")
     >>> times = np.array([0.0, 1.0, 1.5, 2.0])
     >>> response = nlctl.input_output_response(gap, times, [0.0, 2.0, 1.2, 0.0])

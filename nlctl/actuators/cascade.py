@@ -35,7 +35,6 @@ def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.Intercon
 
     Examples
     --------
-    >>> import nlctl
     >>> actuator = cascade({"limit": nlctl.Saturation(limit=2), "inverted": nlctl.Gain(k=-1)})
     >>> print(actuator.output(0, [], [3.0]))
     [-2.]

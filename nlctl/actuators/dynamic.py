@@ -47,7 +47,6 @@ class RateLimiter(_Follower):
     --------
     A unit step is followed at 2 1/s, so it takes half a second:
 
-    >>> import numpy as np
     >>> limiter = nlctl.block(nlctl.RateLimiter(rise=2.0), "actuator")
     >>> response = nlctl.input_output_response(limiter, np.array([0.0, 0.25]), 1.0)
     >>> print(round(response.outputs[-1], 6))
@@ -83,7 +82,6 @@ class Lag(_Follower):
     --------
     After one time constant 1 - 1/e of a step is there:
 
-    >>> import numpy as np
     >>> lag = nlctl.block(nlctl.Lag(T=0.05), "actuator")
     >>> response = nlctl.input_output_response(lag, np.array([0.0, 0.05]), 1.0)
     >>> print(round(response.outputs[-1], 6), round(1 - np.exp(-1), 6))
@@ -112,7 +110,6 @@ class SecondOrderLag(_Follower):
     --------
     A step overshoots by exp(-pi zeta / sqrt(1 - zeta^2)), half a damped period after it:
 
-    >>> import numpy as np
     >>> lag = nlctl.block(nlctl.actuators.SecondOrderLag(omega=20.0, zeta=0.6), "actuator")
     >>> top = np.pi / (20.0 * np.sqrt(1 - 0.6**2))
     >>> response = nlctl.input_output_response(lag, np.array([0.0, top]), 1.0)

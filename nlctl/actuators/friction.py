@@ -198,7 +198,6 @@ class Dahl(_ForceLaw):
     --------
     Along a path in one direction the force tends to F_c as 1 - exp(-sigma_0 x / F_c):
 
-    >>> import numpy as np
     >>> friction = nlctl.block(nlctl.actuators.Dahl(sigma_0=2.0, F_c=1.0), "friction")
     >>> response = nlctl.input_output_response(friction, np.array([0.0, 1.0]), 1.0)
     >>> print(round(response.outputs[-1], 6), round(1 - np.exp(-2), 6))
@@ -236,7 +235,6 @@ class LuGre(_ForceLaw):
     --------
     At a constant velocity the force tends to that of `Stribeck`:
 
-    >>> import numpy as np
     >>> friction = nlctl.block(nlctl.actuators.LuGre(), "friction")
     >>> response = nlctl.input_output_response(friction, np.array([0.0, 0.1]), 0.01)
     >>> steady = nlctl.block(nlctl.actuators.Stribeck(), "steady").output(0, [], [0.01])
@@ -296,7 +294,6 @@ class BoucWen(_ForceLaw):
     --------
     Where gamma + delta > 0 the force tends to a bound:
 
-    >>> import numpy as np
     >>> record = nlctl.actuators.BoucWen(alpha=2.0, beta=1.0, gamma=0.5, delta=0.5)
     >>> force = nlctl.block(record, "spring")
     >>> response = nlctl.input_output_response(force, np.array([0.0, 1.0]), 1.0)

@@ -61,7 +61,6 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: object) -> ct.Interc
 
     Examples
     --------
-    >>> import nlctl
     >>> law = nlctl.controllers.FixedGainLaw(kappa=5.0)
     >>> fixed = replaced(nlctl.adaptive_neural(order=2), law=law)
     >>> float(nlctl.parameters(fixed)["value"]["law.kappa"])
@@ -96,7 +95,6 @@ def ablations(
 
     Examples
     --------
-    >>> import nlctl
     >>> list(ablations(nlctl.adaptive_neural(order=2)))
     ['no network', 'no robust term', 'neither', 'fixed gain']
     """

@@ -93,7 +93,6 @@ def adaptive_neural(
 
     Examples
     --------
-    >>> import nlctl
     >>> controller = adaptive_neural(order=2, law=nlctl.controllers.NussbaumLaw(beta=3.0))
     >>> controller.input_labels
     ['x1', 'x2', 'yd', 'yd1', 'yd2']

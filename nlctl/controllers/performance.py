@@ -44,7 +44,6 @@ class PrescribedPerformance:
     --------
     Half way to its bound the error is answered by k ln 3; at the bound there is no law:
 
-    >>> import numpy as np
     >>> record = nlctl.controllers.PrescribedPerformance(
     ...     k=(2.0,), rho_0=(1.0,), rho_inf=(0.1,), decay=(1.0,)
     ... )

@@ -152,7 +152,6 @@ class GaussianBasis:
 
     Examples
     --------
-    >>> import numpy as np
     >>> record = nlctl.controllers.GaussianBasis(centres=((0.0,), (2.0,)), widths=(2.0,))
     >>> basis = nlctl.block(record, "basis")
     >>> print(basis.output(0, [], [0.0]).round(6), round(np.exp(-1), 6))

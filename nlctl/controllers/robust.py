@@ -15,7 +15,6 @@ class RobustTerm:
     --------
     At r = tau the term is delta_hat tanh(1):
 
-    >>> import numpy as np
     >>> term = nlctl.block(nlctl.controllers.RobustTerm(tau=0.2), "robust")
     >>> print(term.output(0, [2.0], [0.2]).round(6), round(2 * np.tanh(1), 6))
     [1.523188 2.      ] 1.523188

@@ -112,7 +112,6 @@ def interconnect(
 
     Examples
     --------
-    >>> import nlctl
     >>> loop = nlctl.interconnect({"limit": nlctl.Saturation(limit=2)}, inputs=["u"], outputs=["v"])
     >>> print(loop.output(0, [], [3.0]))
     [2.]

@@ -146,7 +146,6 @@ def parameters(system: System) -> pd.DataFrame:
 
     Examples
     --------
-    >>> import nlctl
     >>> float(parameters(nlctl.DeadZone())["value"]["b_r"])
     0.5
     """

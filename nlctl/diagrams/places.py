@@ -136,7 +136,6 @@ def state_names(system: ct.InputOutputSystem) -> list[str]:
 
     Examples
     --------
-    >>> import nlctl
     >>> state_names(nlctl.block(nlctl.Backlash(), "actuator"))
     ['actuator.memory']
     """
@@ -174,7 +173,6 @@ def initial_state(
 
     Examples
     --------
-    >>> import nlctl
     >>> print(initial_state(nlctl.block(nlctl.Backlash(v0=0.2), "actuator")))
     [0.2]
     """

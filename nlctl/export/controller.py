@@ -73,7 +73,6 @@ def export_controller(
 
     Examples
     --------
-    >>> import nlctl
     >>> loop = nlctl.paper.example_1()
     >>> controller = export_controller(loop, "controller", dt=0.01, method="euler")
     >>> controller.inputs
@@ -217,7 +216,6 @@ def export_equations(
 
     Examples
     --------
-    >>> import nlctl
     >>> equations = export_equations(nlctl.paper.example_1(), name="example_1")
     >>> equations.states[:2]
     ('plant_x1', 'plant_x2')

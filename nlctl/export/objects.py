@@ -74,7 +74,6 @@ def object_code(controller: ExportedController, target: str) -> bytes:
 
     Examples
     --------
-    >>> import nlctl
     >>> loop = nlctl.paper.example_1()
     >>> law = nlctl.export.export_controller(loop, "controller", dt=0.01, method="euler")
     >>> object_code(law, "thumbv7em-none-eabihf")[:4]

@@ -147,7 +147,6 @@ def c_files(exported: Exported) -> dict[str, str]:
 
     Examples
     --------
-    >>> import nlctl
     >>> files = c_files(nlctl.export.export_equations(nlctl.paper.example_1(), name="loop"))
     >>> "void loop_rates(" in files["loop.c"]
     True

@@ -390,7 +390,6 @@ def compile(  # noqa: A001 (what it does)
 
     Examples
     --------
-    >>> import nlctl
     >>> backlash = nlctl.compile(nlctl.block(nlctl.Backlash(), "actuator"))
     >>> backlash.system.name
     'actuator'

@@ -157,7 +157,6 @@ def ensemble_response(
     --------
     A sine of amplitude 1 behind gains of 1, 2 and 3, at its peak:
 
-    >>> import numpy as np
     >>> times = np.linspace(0, np.pi, 5)
     >>> gain = nlctl.block(nlctl.Gain(), "actuator")
     >>> many = nlctl.ensemble_response(

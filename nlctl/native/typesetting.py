@@ -91,7 +91,6 @@ def typeset(
 
     Examples
     --------
-    >>> import nlctl
     >>> (law,) = nlctl.typeset(nlctl.block(nlctl.controllers.FixedGainLaw(), "law"))
     >>> print(law.equations[0])
     u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)

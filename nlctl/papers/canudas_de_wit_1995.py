@@ -92,7 +92,6 @@ def example_1(*, name: str = "example_1") -> ct.InterconnectedSystem:
     --------
     Pushed slowly to 1 N it moves by 15 ln 3 micrometres, and does not slide:
 
-    >>> import numpy as np
     >>> loop = nlctl.papers.canudas_de_wit_1995.example_1()
     >>> run = nlctl.input_output_response(loop, [0, 100], [0.0, 1.0], rtol=1e-8, atol=1e-13)
     >>> print((1e6 * run.outputs[0, -1]).round(1), round(15 * float(np.log(3)), 1))

@@ -107,7 +107,6 @@ def sampled_between(times: ArrayLike, breaks: ArrayLike) -> np.ndarray:
     A pulse of 0.02 s between two samples:
 
     >>> import control as ct
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import breaks_of, highest, sampled_between
     >>> kicked = ct.nlsys(
     ...     lambda t, x, u, params: [9.0 * (1.23 <= t < 1.25) - x[0]], None,
@@ -174,7 +173,6 @@ def with_breaks(function: Callable[..., float], breaks: np.ndarray | None) -> Ca
     --------
     A ramp that jumps back at 1 s has its peak between samples:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import peak, with_breaks
     >>> t = np.array([0.0, 0.3, 0.6, 0.9, 1.2, 1.5])
     >>> round(with_breaks(peak, np.array([1.0]))(t, t % 1), 9), float(peak(t, t % 1))

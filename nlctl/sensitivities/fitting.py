@@ -124,7 +124,6 @@ def fit(
 
     Examples
     --------
-    >>> import numpy as np
     >>> lag = nlctl.block(nlctl.Lag(T=1.0), "lag")
     >>> t = np.linspace(0, 2, 21)
     >>> found = nlctl.fit(lag, t, {"v": 1 - np.exp(-t / 0.4)}, {"lag.T": 1.0}, 1.0)

@@ -19,7 +19,6 @@ class MetricGradient:
 
     Examples
     --------
-    >>> import numpy as np
     >>> made = nlctl.sensitivities.MetricGradient(
     ...     key="size", value=1.0, with_respect_to=("p",), scale=np.ones(1), above=np.ones(1),
     ...     below=-np.ones(1),
@@ -100,7 +99,6 @@ def metric_gradient(metric: MetricLike, response: SensitivityResponse) -> Metric
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.metrics import Metric, integral
     >>> lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
     >>> run = nlctl.sensitivity_response(lag, np.linspace(0, 8, 801), 1.0, with_respect_to="lag.T")

@@ -157,7 +157,6 @@ def tune(
     largest with the largest a, 1 - exp(-2) / 0.5:
 
     >>> import control as ct
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, always, in_band
     >>> plant = ct.nlsys(
     ...     lambda t, x, u, params: [-params["a"] * x[0]], lambda t, x, u, params: x, inputs=0,

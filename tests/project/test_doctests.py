@@ -5,6 +5,7 @@ import importlib
 import inspect
 import re
 
+import numpy as np
 import pytest
 from reference import documented_names, our_modules
 from rows import each_row
@@ -29,7 +30,7 @@ def examples(names):
     for name in names:
         module = importlib.import_module(name)
         if ">>> " in inspect.getsource(module):
-            made = finder.find(module, name, extraglobs={"nlctl": nlctl})
+            made = finder.find(module, name, extraglobs={"nlctl": nlctl, "np": np})
             found |= {each.name: each for each in made if each.examples}
     return found
 

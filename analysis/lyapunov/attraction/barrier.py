@@ -257,7 +257,6 @@ def barrier(
     --------
     A damped oscillator from around (1, 0) never comes to x1 < -0.95:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.lyapunov import Box, barrier
     >>> found = barrier(
     ...     lambda x: (x[1], -x[0] - x[1]),

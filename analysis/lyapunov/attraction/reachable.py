@@ -141,7 +141,6 @@ def reachable_set(
     --------
     A pendulum without friction, from around rest and between two speeds, does not turn over:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.lyapunov import Box, reachable_set
     >>> found = reachable_set(
     ...     lambda x: (x[1], -np.sin(x[0])),

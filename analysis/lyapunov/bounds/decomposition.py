@@ -31,7 +31,6 @@ class DecompositionError(UsageError):
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import decompose
     >>> decompose(nlctl.Saturation())
     Traceback (most recent call last):
@@ -148,7 +147,6 @@ def decompose(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import decompose
     >>> split = decompose(nlctl.DeadZone(ripple_r=0, ripple_l=0))
     >>> print(split.k_1, split.k_2, split.eps_low, split.eps_high, split.provenance)

@@ -123,7 +123,6 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     --------
     h(x, v) / v of Example 1 lies in (1 +- 0.1) (1 +- 0.2):
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, sector
     >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, 0.0), high=(1.0, 1.0, 5.0))
     >>> found = sector(nlctl.plants.ForcedDuffing(), box).positive

@@ -80,7 +80,6 @@ def minimax_weights(network: Network, largest: float | None = None) -> np.ndarra
     --------
     The best constant for g = x1^2 on [0, 1] misses it by 1/2 at both ends:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.lyapunov import minimax_weights
     >>> from nlctl.analysis.lyapunov.bounds.weights import Network
     >>> x = np.linspace(0, 1, 11)[:, None]
@@ -140,8 +139,6 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     A larger sigma_1 makes weights costly: they become smaller than those that approximate best.
 
     >>> import dataclasses
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import read_parts, tightest_weights
     >>> from nlctl.analysis.lyapunov.bounds.weights import Network
     >>> x = np.linspace(0, 1, 11)[:, None]
@@ -222,7 +219,6 @@ def approximation_error(
     --------
     Without weights it is the range of g, here -6 x1 + x1^2 for x1 in [0, 0.1]:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, approximation_error
     >>> box = Box(names=("x1", "x2", "x3"), low=(0.0,) * 3, high=(0.1, 0.0, 0.0))
     >>> found = approximation_error(nlctl.plants.Genesio(), None, (), box)

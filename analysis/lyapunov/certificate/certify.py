@@ -102,7 +102,6 @@ def certify(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import certify
     >>> law = nlctl.controllers.KnownSignLaw()
     >>> robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)
@@ -116,7 +115,6 @@ def certify(
     Model reference adaptive control of x' = 2 x + v + 0.5 sin t with sigma-modification; the closed
     form of completed squares, with k = 1, P = 1/2, D = 1/2, sigma = 0.2, W = 2, is V <= 0.925:
 
-    >>> import numpy as np
     >>> plant = nlctl.PureFeedback(
     ...     order=1, f=lambda x, v: 2.0 * x[0] + v, d=lambda x, t: 0.5 * np.sin(t)
     ... )

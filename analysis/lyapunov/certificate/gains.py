@@ -123,7 +123,6 @@ def design(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import design
     >>> law = nlctl.controllers.KnownSignLaw()
     >>> robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)

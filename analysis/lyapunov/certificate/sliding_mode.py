@@ -52,7 +52,6 @@ class SlidingModeCertificate(filtered.FilteredCertificate):
     --------
     The plant of Example 1 behind a linear actuator; |r| is in the layer in the end:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import certify
     >>> controller = nlctl.sliding_mode(law=nlctl.controllers.SlidingModeLaw(K=20.0, phi=0.1))
     >>> loop = nlctl.paper.example_1(controller=controller, actuator=nlctl.Gain())

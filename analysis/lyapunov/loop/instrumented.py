@@ -60,7 +60,6 @@ def sharpest(split: Decomposition) -> Decomposition:
     --------
     Where v = k u is within the bounds of k nothing is left for eps_u:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import decompose, sharpest
     >>> split = decompose(nlctl.DeadZone(ripple_r=0, ripple_l=0))
     >>> zone = nlctl.block(nlctl.DeadZone(ripple_r=0, ripple_l=0), "actuator")
@@ -91,7 +90,6 @@ class NussbaumIntegral:
     --------
     Its three integrals are states and outputs:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import NussbaumIntegral
     >>> nlctl.block(NussbaumIntegral(), "integral").state_labels
     ['I', 'I_bar', 'I_printed']
@@ -191,8 +189,6 @@ def observed(
     --------
     Every step of the proof, from a run of the loop with all its signals:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import (
     ...     Box, comparison, constants, inequalities, observed, premises, read_parts, signals_of
     ... )

@@ -447,7 +447,6 @@ def read_parts(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import read_parts
     >>> parts = read_parts(nlctl.paper.example_1(), params={"law.beta": 3.0})
     >>> type(parts.actuator).__name__, parts.gains.beta

@@ -72,8 +72,6 @@ def signals_of(response: SystemResponse | Signals) -> Signals:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import signals_of
     >>> response = nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 0.1, 11))
     >>> float(signals_of(response)["zeta"][0])

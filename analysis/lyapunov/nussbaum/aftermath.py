@@ -83,7 +83,6 @@ def aftermath(
     --------
     Where k G is constant, zeta rests where the integral of N since the beginning is 0:
 
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import aftermath
     >>> found = aftermath(3.0, kG=(2.0, 2.0))
     >>> low, high = found.rest

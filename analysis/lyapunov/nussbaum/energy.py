@@ -81,8 +81,6 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.lyapunov import drift, drift_margin
     >>> loop = nlctl.paper.example_1()
     >>> run = drift(nlctl.input_output_response(loop, np.linspace(0, 1, 101)))

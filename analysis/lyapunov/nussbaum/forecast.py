@@ -37,8 +37,6 @@ class BurstForecast:
     --------
     From zeta = 1 with r u = -0.4, and zeta at its lobe's place for each time, at a constant rate:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import BurstForecast
     >>> N = nlctl.functions.nussbaum_integral
     >>> zetas = np.linspace(1.0, 3.0, 4001)  # a lobe of N

@@ -134,8 +134,6 @@ def prepare(experiment: Experiment) -> Prepared:
     --------
     A lag whose time constant is uncertain has to be at 0.9 from 0.3 s on:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, always, evaluate, grid, in_band,
     ...     prepare, rows,

@@ -227,7 +227,6 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     Examples
     --------
     >>> import tempfile
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, grid, in_band, load, prepare, sweep
     ... )
@@ -312,8 +311,6 @@ def sweep(
     --------
     Dead zones of many widths; it stops as soon as it is clear that few are too wide:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, eventually, in_band, independent,
     ...     prepare, sweep, until_decided,

@@ -89,8 +89,6 @@ def confirm(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, always, confirm, in_band, prepare
     ... )

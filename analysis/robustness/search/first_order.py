@@ -40,7 +40,6 @@ class FirstOrder:
     --------
     y = z(t) with z of three pieces; the largest is lowered by lowering all that are largest:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, eventually, in_band
     >>> from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest_nearby
     >>> high = Requirement(key="high", formula=eventually(in_band("y", lower=1.0)), until=2.0)
@@ -242,8 +241,6 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, always, first_order, in_band, prepare
     ... )

@@ -70,8 +70,6 @@ def largest_scale(
     --------
     A dead zone needs b_r >= 0, so that a box of 0.5 +- 0.2 may grow to 2.5 times its size:
 
-    >>> import numpy as np
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, eventually, in_band, largest_scale,
     ...     prepare,

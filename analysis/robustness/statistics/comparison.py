@@ -78,7 +78,6 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     Examples
     --------
     >>> from nlctl.analysis.robustness import Choice, Space, Uncertain, crossed, grid
-    >>> import nlctl
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> law = Choice(name="law", options={"one": nlctl.Gain(k=1.0), "two": nlctl.Gain(k=2.0)})
     >>> crossed(grid(space, 2), law).values.tolist()
@@ -139,7 +138,6 @@ def compare(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import Choice, Space, Uncertain
     >>> from nlctl.analysis.robustness import compare, crossed, independent
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))

@@ -315,7 +315,6 @@ def holm(p_values: np.ndarray) -> np.ndarray:
 
     Examples
     --------
-    >>> import numpy as np
     >>> holm(np.array([0.01, 0.04])).tolist()
     [0.02, 0.04]
     """

@@ -170,7 +170,6 @@ def in_band(
     --------
     The margin counts in multiples of the bound:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, in_band, margin
     >>> band = Requirement(key="band", formula=in_band("e", lower=-0.2, upper=0.2), until=0.0)
     >>> margin(band, np.zeros(1), {"e": np.array([0.1])})
@@ -218,7 +217,6 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     --------
     The error stays within 0.1 from 1 s on:
 
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, always, in_band, margin
     >>> small = always(in_band("e", lower=-0.1, upper=0.1), start=1.0)
     >>> tracks = Requirement(key="tracks", formula=small, until=5.0)
@@ -248,7 +246,6 @@ def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventu
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, eventually, in_band, margin
     >>> rises = Requirement(key="rises", formula=eventually(in_band("y", lower=0.9)), until=5.0)
     >>> times = np.linspace(0.0, 5.0, 501)

@@ -275,7 +275,6 @@ def margin(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, always, in_band, margin
     >>> low = Requirement(key="low", formula=always(in_band("u", upper=10.0)), until=1.0)
     >>> times = np.linspace(0.0, 1.0, 11)
@@ -355,7 +354,6 @@ def margins(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, Spec, in_band, margins
     >>> low = Requirement(key="low", formula=in_band("u", upper=10.0), until=0.0)
     >>> high = Requirement(key="high", formula=in_band("u", lower=-10.0), until=0.0)

@@ -58,7 +58,6 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     --------
     Names may be short, and the diagram says what is nominal:
 
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import Space, Uncertain, nominal, resolved
     >>> space = Space(quantities=(Uncertain(name="b_r", bounds=(0.4, 0.7)),))
     >>> nominal(resolved(space, nlctl.actuators.cascade({"zone": nlctl.DeadZone(b_r=0.5)})))
@@ -160,7 +159,6 @@ def diagrams(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import Choice, Space, diagrams
     >>> stages = {"zone": nlctl.DeadZone(), "gain": nlctl.Gain()}
     >>> space = Space(choices=(Choice(name="stage", options=stages),))

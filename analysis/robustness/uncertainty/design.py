@@ -73,7 +73,6 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
 
     Examples
     --------
-    >>> import numpy as np
     >>> from nlctl.analysis.robustness import Space, Uncertain, independent, row_seed
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> once, again = (row_seed(independent(space, size, entropy=1), 2) for size in (3, 9))

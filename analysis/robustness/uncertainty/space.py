@@ -138,7 +138,6 @@ class Choice:
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.analysis.robustness import Choice
     >>> bodies = {"dead zone": nlctl.DeadZone(), "gain": nlctl.Gain()}
     >>> Choice(name="actuator", options=bodies).nominal

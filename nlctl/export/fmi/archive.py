@@ -320,7 +320,6 @@ def fmu(
 
     Examples
     --------
-    >>> import nlctl
     >>> loop = nlctl.paper.example_1()
     >>> nlctl.export.fmu(loop, "loop.fmu", name="loop")  # doctest: +SKIP
     PosixPath('loop.fmu')

@@ -81,7 +81,6 @@ def handles(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.export.web import handles
     >>> loop = nlctl.paper.example_1()
     >>> compiled = nlctl.compile(loop)

@@ -324,7 +324,6 @@ def web_program(
 
     Examples
     --------
-    >>> import nlctl
     >>> from nlctl.export.web import web_program
     >>> program = web_program(nlctl.paper.example_1(), [0.0, 0.5, 1.0])  # doctest: +SKIP
     >>> program.module[:4], program.states[:2]  # doctest: +SKIP

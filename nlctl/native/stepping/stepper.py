@@ -81,7 +81,6 @@ class Stepper:
 
     Examples
     --------
-    >>> import numpy as np
     >>> tank = nlctl.stepper(nlctl.block(nlctl.Lag(T=1.0), "tank"), 0.1)
     >>> y = tank.reset({"tank.v": 0.5})
     >>> for _ in range(10):

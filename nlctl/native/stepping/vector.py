@@ -43,7 +43,6 @@ class VectorStepper:
 
     Examples
     --------
-    >>> import numpy as np
     >>> lag = nlctl.block(nlctl.Lag(T=1.0), "lag")
     >>> many = nlctl.vector_stepper(lag, 0.1, 3)
     >>> y = many.reset({"lag.v": np.array([0.0, 1.0, 2.0])}, {"lag.T": np.array([1.0, 1.0, 0.5])})
