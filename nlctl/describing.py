@@ -204,7 +204,6 @@ def limit_cycles(
     --------
     Of python-control's own example an amplitude of 3.34 is predicted, and the loop has 3.38:
 
-    >>> import control as ct
     >>> plant = ct.tf([8], [1, 2, 2, 1])
     >>> saturation = nlctl.block(nlctl.Saturation(limit=1.0), "saturation")
     >>> (cycle,) = nlctl.limit_cycles(plant, saturation, [1.5, 2, 3, 4])
@@ -333,7 +332,6 @@ def describing_function_plot(
 
     Examples
     --------
-    >>> import control as ct
     >>> plant = ct.tf([8], [1, 2, 2, 1])
     >>> saturation = nlctl.block(nlctl.Saturation(limit=1.0), "saturation")
     >>> drawn = nlctl.describing_function_plot(plant, saturation, [1.5, 2, 3, 4])

@@ -188,7 +188,6 @@ def input_output_response(
 
     Examples
     --------
-    >>> import control as ct
     >>> lag = ct.ss(-1, 1, 1, 0)
     >>> response = input_output_response(lag, [0, 1], 1, engine="python-control")
     >>> round(float(response.outputs[-1]), 6)  # 1 - exp(-1)

@@ -161,7 +161,6 @@ class Pulse(_Source):
     --------
     However narrow it is, no step leads over it: its integral is height times width.
 
-    >>> import control as ct
     >>> integrator = ct.ss(0, 1, 1, 0, inputs="ref", outputs="y", name="integrator")
     >>> pulse = nlctl.sources.Pulse(height=5.0, t_start=60.0, width=1e-3)
     >>> loop = nlctl.interconnect({"pulse": pulse, "integrator": integrator}, outputs=["y"])

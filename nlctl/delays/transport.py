@@ -52,7 +52,6 @@ class TransportDelay:
 
     Examples
     --------
-    >>> import control as ct
     >>> wire = nlctl.block(nlctl.TransportDelay(inputs=("x",), outputs=("y",), delay=1.0), "wire")
     >>> plant = ct.ss(0, -1, 1, 0, inputs="y", outputs="x", name="plant")
     >>> loop = ct.interconnect([wire, plant], inputs=[], outputs=["x"], inplist=[])

@@ -462,7 +462,6 @@ def linearize(
     --------
     A lag behind a zero-order hold is what ``ct.sample_system`` makes of it:
 
-    >>> import control as ct
     >>> lag = ct.ss(-1, 1, 1, 0, inputs="v", outputs="y", name="lag")
     >>> hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="u", outputs="v", name="hold"))
     >>> held = nlctl.interconnect([lag, hold], inputs=["u"], outputs=["y"])

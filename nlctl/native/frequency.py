@@ -77,7 +77,6 @@ def frequency_response(
 
     Examples
     --------
-    >>> import control as ct
     >>> wire = nlctl.block(nlctl.TransportDelay(inputs=("u",), outputs=("v",), delay=0.5), "wire")
     >>> lag = ct.ss(-1, 1, 1, 0, inputs="v", outputs="y", name="lag")
     >>> chain = nlctl.interconnect([wire, lag], inputs=["u"], outputs=["y"])

@@ -175,7 +175,6 @@ def find_operating_point(
 
     Examples
     --------
-    >>> import control as ct
     >>> pendulum = ct.nlsys(lambda t, x, u, params: [x[1], u[0] - 9.81 * np.sin(x[0])],
     ...                     inputs=["torque"], states=["angle", "rate"], name="pendulum")
     >>> point = nlctl.find_operating_point(pendulum, [1.0, 0.0], 0.0, [0.5, 0.0],
@@ -237,7 +236,6 @@ def find_operating_points(
 
     Examples
     --------
-    >>> import control as ct
     >>> cubic = ct.nlsys(lambda t, x, u, params: x - x**3, inputs=0, states=1, name="cubic")
     >>> [p.states.round(6).item() for p in nlctl.find_operating_points(cubic, [[-2], [0.1], [3]])]
     [-1.0, 0.0, 1.0]

@@ -106,7 +106,6 @@ def luenberger(plant: ct.StateSpace, poles: object = None, *, L: Any = None) -> 
 
     Examples
     --------
-    >>> import control as ct
     >>> plant = ct.ss([[0, 1], [-1, 0]], [[0], [1]], [[1, 0]], 0, inputs="v", outputs="y")
     >>> observer = nlctl.observers.luenberger(plant, poles=[-2, -3])
     >>> print(observer.inputs, np.round(observer.L, 9).ravel())

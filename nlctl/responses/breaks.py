@@ -106,7 +106,6 @@ def sampled_between(times: ArrayLike, breaks: ArrayLike) -> np.ndarray:
     --------
     A pulse of 0.02 s between two samples:
 
-    >>> import control as ct
     >>> from nlctl.analysis.metrics import breaks_of, highest, sampled_between
     >>> kicked = ct.nlsys(
     ...     lambda t, x, u, params: [9.0 * (1.23 <= t < 1.25) - x[0]], None,

@@ -44,7 +44,6 @@ def discretise(system: System, dt: float, method: str = "euler") -> ct.Nonlinear
 
     Examples
     --------
-    >>> import control as ct
     >>> lag = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="lag")
     >>> float(nlctl.discretise(lag, 0.1).A[0, 0])
     0.9

@@ -342,7 +342,6 @@ def sampled(
 
     Examples
     --------
-    >>> import control as ct
     >>> plant = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="plant")
     >>> law = ct.ss([], [], [], -2, 0.1, inputs="y", outputs="u", name="law")
     >>> parts = [plant, nlctl.sampled(law)]

@@ -23,7 +23,6 @@ class TriggeredHold:
     --------
     x' = x + w with w = -2 x, sampled where the error exceeds 0.3 |x|:
 
-    >>> import control as ct
     >>> plant = ct.ss(1, 1, 1, 0, inputs="u", outputs="x", name="plant")
     >>> hold = nlctl.block(nlctl.TriggeredHold(n=1), "hold")
     >>> rule = ct.nlsys(

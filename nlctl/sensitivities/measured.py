@@ -293,7 +293,6 @@ class Fit:
 
     Examples
     --------
-    >>> import control as ct
     >>> plant = ct.nlsys(
     ...     lambda t, x, u, params: [params["a"]], lambda t, x, u, params: x, inputs=0,
     ...     outputs=["x"], states=["x"], params={"a": 1.0}, name="plant",

@@ -435,7 +435,6 @@ def sensitivity_response(
     --------
     x' = 1 + (x > p) from 0: behind t = p it is 2 t - p, and its derivative by p is -1.
 
-    >>> import control as ct
     >>> plant = ct.nlsys(
     ...     lambda t, x, u, params: [1 + np.where(x[0] > params["p"], 1.0, 0.0)],
     ...     states=["x"], inputs=0, params={"p": 0.5}, name="plant",

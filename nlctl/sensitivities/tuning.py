@@ -156,7 +156,6 @@ def tune(
     x' = -a x from x = 1 is at exp(-a) at t = 1, where |x| <= 0.5 is asked; the margin is the
     largest with the largest a, 1 - exp(-2) / 0.5:
 
-    >>> import control as ct
     >>> from nlctl.analysis.robustness import Requirement, always, in_band
     >>> plant = ct.nlsys(
     ...     lambda t, x, u, params: [-params["a"] * x[0]], lambda t, x, u, params: x, inputs=0,

@@ -85,7 +85,6 @@ class IdealRelay:
     --------
     x' = 1/2 - sign(x) from 1 comes to 0 at t = 2, and stays there with v = 1/2:
 
-    >>> import control as ct
     >>> plant = ct.nlsys(
     ...     lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0], states=1, inputs=["v"],
     ...     outputs=["u"], name="plant",

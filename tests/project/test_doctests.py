@@ -5,6 +5,7 @@ import importlib
 import inspect
 import re
 
+import control as ct
 import numpy as np
 import pytest
 from reference import documented_names, our_modules
@@ -12,6 +13,7 @@ from rows import each_row
 
 import nlctl
 
+FIRST = {"nlctl": nlctl, "np": np, "ct": ct}  # as the reference of the site says
 REFERS = re.compile(r"\nExamples\n--------\nSee `(\w+)`\.$")
 
 
@@ -30,7 +32,7 @@ def examples(names):
     for name in names:
         module = importlib.import_module(name)
         if ">>> " in inspect.getsource(module):
-            made = finder.find(module, name, extraglobs={"nlctl": nlctl, "np": np})
+            made = finder.find(module, name, extraglobs=FIRST)
             found |= {each.name: each for each in made if each.examples}
     return found
 

@@ -246,7 +246,6 @@ def slow_drift(
     --------
     From zeta = 1 with r u = -0.4, where A grows at that rate through the lobe of N up to zeta = 3:
 
-    >>> import control as ct
     >>> from nlctl.analysis.lyapunov import slow_drift
     >>> N = nlctl.functions.nussbaum_integral
     >>> zetas, t = np.linspace(1.0, 3.0, 4001), np.linspace(0.0, 100.0, 10001)

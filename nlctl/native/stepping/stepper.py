@@ -391,7 +391,6 @@ def stepper(
 
     Examples
     --------
-    >>> import control as ct
     >>> lag = nlctl.stepper(ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="lag"), dt=0.5)
     >>> lag.reset()
     array([0.])

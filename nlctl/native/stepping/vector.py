@@ -280,7 +280,6 @@ def vector_stepper(
 
     Examples
     --------
-    >>> import control as ct
     >>> lag = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="lag")
     >>> many = nlctl.vector_stepper(lag, 0.5, 2)
     >>> print(many.step([[1.0], [-1.0]]).round(6).ravel())  # 1 - exp(-0.5), and its negative
