@@ -1,5 +1,7 @@
 """What is checked of the functions of a diagram before any is traced or compiled."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator
 from typing import Any
 
