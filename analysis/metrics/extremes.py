@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .curves import limits_at_breaks, turning_points
+from .curves import largest_of, limits_at_breaks, turning_points
 from .samples import of_samples
 
 __all__ = ["final", "highest", "lowest", "peak", "spread", "ultimate_bound", "vertex"]
@@ -69,16 +69,16 @@ def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     >>> round(highest(t, y), 9), highest(t, np.minimum(y, 0.9))
     (1.0, 0.9)
     """
-    top = np.max(y)
+    top = largest_of(y)
     if not np.all(np.isfinite(y)):  # NaN and inf stay, -inf is no calm maximum of the rest
         return np.nan if np.isfinite(top) else float(top)
     breaks = t[:0] if breaks is None else np.asarray(breaks)
     _, _, values = turning_points(t, y, breaks)
     if values.size:
-        top = max(top, np.max(values))
+        top = max(top, largest_of(values))
     _, values = limits_at_breaks(t, y, breaks)
     if values.size:
-        top = max(top, np.max(values))
+        top = max(top, largest_of(values))
     return float(top)
 
 

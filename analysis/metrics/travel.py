@@ -147,7 +147,7 @@ def reversals(t: np.ndarray, y: np.ndarray, above: float = 0.0, breaks: np.ndarr
     turns = y[moving[:-1][up[1:] != up[:-1]] + 1]
     count, direction = 0.0, 0
     low = high = y[0]
-    for value in np.append(turns, y[-1]):
+    for value in np.concatenate((turns, y[-1:])):
         low, high = min(low, value), max(high, value)
         if direction <= 0 and value - low > above:
             count += direction < 0

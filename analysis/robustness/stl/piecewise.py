@@ -7,12 +7,11 @@ and windows of piecewise linear functions are piecewise linear again, so nothing
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from nlctl.native.machine.machine_code import kept
-
-from ...metrics.curves import path, turning_points
+from ...metrics.compiled import SAMPLE_FUNCTIONS
 
 
 @dataclass(frozen=True)
@@ -52,8 +51,14 @@ class Trace:
 
 
 _NONE = np.empty(0)
-_compiled = kept(nogil=True, error_model="numpy")
-_vertices, _path = _compiled(turning_points), _compiled(path)
+
+
+def _path(*given: Any) -> tuple[np.ndarray, np.ndarray]:
+    return SAMPLE_FUNCTIONS.functions["path"](*given)
+
+
+def _vertices(*given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return SAMPLE_FUNCTIONS.functions["turning_points"](*given)
 
 
 def with_vertices(
