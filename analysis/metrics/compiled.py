@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numba import types
+from numpy.typing import ArrayLike
 
 from nlctl.host.checkout import file_of_nlctl
 from nlctl.native.machine.machine_code import Wanted
@@ -56,6 +57,11 @@ SAMPLE_FUNCTIONS = Shipped(
 )
 
 
+def as_row(values: ArrayLike) -> np.ndarray:
+    """Return values as machine code takes them."""
+    return np.ascontiguousarray(values, dtype=float)
+
+
 def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a metric's function, or one with arguments by `partial`, as machine code.
 
@@ -83,7 +89,7 @@ def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
     if isinstance(function, functools.partial):
         inner = in_machine_code(function.func)
         return functools.partial(inner, *function.args, **function.keywords)
-    return _compiled(function) if function in _NUMBER_OF else function
+    return _compiled(function) if any(function is one for one in _NUMBER_OF) else function
 
 
 @functools.cache
@@ -98,10 +104,12 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
     def called(t: np.ndarray, y: np.ndarray, *given: float, **named: Any) -> Any:
         values = defaults | dict(zip(names, given, strict=False)) | named
-        fits = len(values) == len(names) >= len(given) and np.shape(t) == np.shape(y)
-        if not fits or values.keys() != set(names):
+        fits = np.shape(t) == np.shape(y) and np.size(t) > 1 and values.keys() == set(names)
+        if not fits or len(given) > len(names) or any(n in named for n in names[: len(given)]):
             return function(t, y, *given, **named)  # says what is wrong
         code: Any = codes[values.get("breaks") is not None]
-        return code(t, y, *map(values.get, names))
+        if values.get("breaks") is not None:
+            values["breaks"] = as_row(values["breaks"])
+        return code(as_row(t), as_row(y), *map(values.get, names))
 
     return called

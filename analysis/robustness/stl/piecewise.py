@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...metrics.compiled import SAMPLE_FUNCTIONS
+from ...metrics.compiled import SAMPLE_FUNCTIONS, as_row
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,12 @@ class Trace:
 _NONE = np.empty(0)
 
 
-def _path(*given: Any) -> tuple[np.ndarray, np.ndarray]:
-    return SAMPLE_FUNCTIONS.functions["path"](*given)
+def _path(t: Any, y: Any, breaks: Any, apart: float) -> tuple[np.ndarray, np.ndarray]:
+    return SAMPLE_FUNCTIONS.functions["path"](*map(as_row, (t, y, breaks)), apart)
 
 
-def _vertices(*given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return SAMPLE_FUNCTIONS.functions["turning_points"](*given)
+def _vertices(t: Any, y: Any, breaks: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return SAMPLE_FUNCTIONS.functions["turning_points"](*map(as_row, (t, y, breaks)))
 
 
 def with_vertices(
