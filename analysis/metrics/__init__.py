@@ -2,6 +2,7 @@
 
 from nlctl.responses.breaks import breaks_of, sampled_between, with_breaks
 
+from .compiled import in_machine_code
 from .extremes import final, highest, lowest, peak, spread, ultimate_bound, vertex
 from .integrals import (
     absolute_integral,
@@ -11,7 +12,7 @@ from .integrals import (
     square_integral,
     time_weighted_integral,
 )
-from .tracking import Metric, in_machine_code, over, tracking_metrics
+from .tracking import Metric, over, tracking_metrics
 from .travel import reversals, settling_time, time_within, total_variation
 
 __all__ = [

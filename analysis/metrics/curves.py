@@ -19,6 +19,8 @@ by at most h^2 |y''| / 8.
 from both sides, extrapolated from the samples of that side, are values of the signal as well.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from nlctl.equations import equation
@@ -34,6 +36,18 @@ _APART = 1e-12  # of the time covered: by how much a path jumps before and after
 _LINE = 2.5e-7  # of a signal's range: how far lines of a path may be from its curves
 _PARTS = 32.0  # of an interval, at most
 _ENDS = 17  # points from the last sample to a break
+
+
+@equation
+def largest_of(y):
+    """Return the largest value, NaN if there is one: of `numpy.max` shipped code has nothing."""
+    return y[np.argmax(y)]
+
+
+@equation
+def smallest_of(y):
+    """Return the smallest value, see `largest_of`."""
+    return y[np.argmin(y)]
 
 
 @equation
@@ -147,7 +161,7 @@ def _held(y, value):
 @equation
 def _limits(y):
     """Return below and above which no curve goes: -inf and inf where no value is held."""
-    low, high = np.min(y), np.max(y)
+    low, high = smallest_of(y), largest_of(y)
     return low if _held(y, low) else -np.inf, high if _held(y, high) else np.inf
 
 
@@ -165,7 +179,7 @@ def turning_points(t, y, breaks):
             continue
         own_t, own_y, size = t[first:last], y[first:last], last - first
         d = consecutive_differences(own_y)
-        up, down = np.append(-d[:1], d), np.append(d, -d[-1:])
+        up, down = np.concatenate((-d[:1], d)), np.concatenate((d, -d[-1:]))
         turns = ((up > 0) & (down <= 0)) | ((up < 0) & (down >= 0))
         for k in np.nonzero(turns)[0]:
             low = own_t[k - 1] if k > 0 else start
@@ -200,7 +214,7 @@ def _extrapolated(t, y, at):
             best, least = total, abs(term)
             off = least * min(1.0, least / before) if 0.0 < before < np.inf else least
         before = abs(term)
-    high, low = np.max(y), np.min(y)
+    high, low = largest_of(y), smallest_of(y)
     if best > high:
         return max(high, best - off)
     return min(low, best + off) if best < low else best
@@ -299,7 +313,7 @@ def path(t, y, breaks, apart=0.0):
     # Where samples show that a piece is smooth, lines are within 2.5e-7 of the signal's range of
     # its curve, where 32 parts of an interval are enough for that.
     apart = apart if apart > 0.0 else _APART * (t[-1] - t[0])
-    tolerance = _LINE * (np.max(y) - np.min(y))
+    tolerance = _LINE * (largest_of(y) - smallest_of(y))
     firsts, lasts, starts, ends = _pieces(t, breaks)
     parts, n = np.ones(t.size, np.int64), 0
     for first, last in zip(firsts, lasts):  # noqa: B905 (numba)

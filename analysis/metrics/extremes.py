@@ -4,9 +4,11 @@
 of the events of a run.  A signal with NaN has the number NaN, or one that is not a finite number.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
-from .curves import limits_at_breaks, turning_points
+from .curves import largest_of, limits_at_breaks, turning_points
 from .samples import of_samples
 
 __all__ = ["final", "highest", "lowest", "peak", "spread", "ultimate_bound", "vertex"]
@@ -60,22 +62,23 @@ def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     --------
     A parabola's vertex is found exactly, a clipped one has the limit as its largest value:
 
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import highest
     >>> t = np.linspace(-1.0, 1.0, 9)
     >>> y = 1 - (t - 0.1) ** 2
     >>> round(highest(t, y), 9), highest(t, np.minimum(y, 0.9))
     (1.0, 0.9)
     """
-    top = np.max(y)
+    top = largest_of(y)
     if not np.all(np.isfinite(y)):  # NaN and inf stay, -inf is no calm maximum of the rest
         return np.nan if np.isfinite(top) else float(top)
     breaks = t[:0] if breaks is None else np.asarray(breaks)
     _, _, values = turning_points(t, y, breaks)
     if values.size:
-        top = max(top, np.max(values))
+        top = max(top, largest_of(values))
     _, values = limits_at_breaks(t, y, breaks)
     if values.size:
-        top = max(top, np.max(values))
+        top = max(top, largest_of(values))
     return float(top)
 
 
@@ -90,6 +93,7 @@ def lowest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import lowest
     >>> t = np.linspace(-1.0, 1.0, 9)
     >>> round(lowest(t, (t - 0.1) ** 2 - 1), 9)
@@ -109,6 +113,7 @@ def spread(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import spread
     >>> t = np.linspace(0.0, 2 * np.pi, 1001)
     >>> round(spread(t, 3 * np.sin(t)), 6)
@@ -128,6 +133,7 @@ def peak(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import peak
     >>> peak(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
     3.0
@@ -155,6 +161,7 @@ def ultimate_bound(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import ultimate_bound
     >>> t = np.linspace(0.0, 4.0, 401)
     >>> print(round(ultimate_bound(t, np.exp(-t)), 6), round(np.exp(-3), 6))
@@ -175,6 +182,7 @@ def final(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import final
     >>> final(np.array([0.0, 1.0]), np.array([5.0, 7.0]))
     7.0

@@ -1,5 +1,7 @@
 """Integrals of a signal over time, by Simpson's rule on any samples."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from .samples import of_samples
@@ -25,6 +27,7 @@ def consecutive_differences(y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import consecutive_differences
     >>> print(consecutive_differences(np.array([1.0, 4.0, 9.0])))
     [3. 5.]
@@ -47,6 +50,7 @@ def integral(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import integral
     >>> t = np.array([0.0, 0.3, 1.0])
     >>> round(integral(t, t**2), 12)  # exact for parabolas
@@ -78,6 +82,7 @@ def rms(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import rms
     >>> t = np.linspace(0.0, 2 * np.pi, 1001)
     >>> print(round(rms(t, np.sin(t)), 6), round(np.sqrt(0.5), 6))
@@ -97,6 +102,7 @@ def absolute_integral(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import absolute_integral
     >>> t = np.linspace(0.0, 1.0, 3)
     >>> absolute_integral(t, -2 * np.ones(3))
@@ -116,6 +122,7 @@ def square_integral(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import square_integral
     >>> t = np.linspace(0.0, 1.0, 3)
     >>> square_integral(t, -2 * np.ones(3))
@@ -135,6 +142,7 @@ def time_weighted_integral(t: np.ndarray, y: np.ndarray):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import time_weighted_integral
     >>> t = np.linspace(1.0, 2.0, 3)
     >>> time_weighted_integral(t, -2 * np.ones(3))

@@ -1,10 +1,9 @@
-"""Named numbers of a response, the usual ones of a tracking loop, and their machine code."""
+"""Named numbers of a response, and the usual ones of a tracking loop."""
 
-import functools
-import inspect
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, number, text
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.native.machine.machine_code import kept
 
 from . import extremes, integrals, travel
 
@@ -29,6 +27,7 @@ class Metric:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import Metric, peak
     >>> effort = Metric(key="peak_u", signal="u", unit="1", meaning="largest input", function=peak)
     >>> effort.signals, effort.function(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
@@ -81,6 +80,7 @@ def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.nda
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import over
     >>> t = np.linspace(0.0, 1.0, 5)
     >>> print(*over(t, t**2, 0.4, 1.0))
@@ -134,6 +134,7 @@ def tracking_metrics(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.robustness import tracking_metrics
     >>> metrics = {metric.key: metric for metric in tracking_metrics(start=1.0, band=0.1)}
     >>> times = np.linspace(0.0, 2 * np.pi, 1001)
@@ -176,41 +177,3 @@ def tracking_metrics(
         for key, signal, unit, meaning, function in rows
         if signal
     )
-
-
-OWN = [getattr(home, name) for home in (extremes, integrals, travel) for name in home.__all__]
-
-
-def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a metric's function, or one with arguments by `partial`, as machine code.
-
-    It keeps no thread of an ensemble waiting, and agrees with the original to rounding.  Other
-    functions are returned as they are.
-
-    Parameters
-    ----------
-    function : callable
-        Takes (t, y).
-
-    Returns
-    -------
-    callable
-        Takes the same arguments.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.metrics import in_machine_code, integral
-    >>> t = np.array([0.0, 0.5, 1.0])
-    >>> round(in_machine_code(integral)(t, t**2), 12)
-    0.333333333333
-    """
-    if isinstance(function, functools.partial):
-        return functools.partial(
-            in_machine_code(function.func), *function.args, **function.keywords
-        )
-    return _compiled(function) if any(function is metric for metric in OWN) else function
-
-
-@functools.cache
-def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return kept(nogil=True, error_model="numpy")(inspect.unwrap(function))

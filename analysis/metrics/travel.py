@@ -4,6 +4,8 @@ With `breaks`, the times (s) of kinks and jumps, it moves as `curves.path` does:
 them, and at once where it jumps.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from .curves import path
@@ -24,6 +26,7 @@ def total_variation(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = No
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import total_variation
     >>> total_variation(np.arange(4.0), np.array([0.0, 2.0, 1.0, 1.0]))
     3.0
@@ -52,6 +55,7 @@ def settling_time(t: np.ndarray, y: np.ndarray, band: float, breaks: np.ndarray 
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import settling_time
     >>> t = np.linspace(0.0, 5.0, 5001)
     >>> print(round(settling_time(t, np.exp(-t), 0.05), 4), round(np.log(20), 4))
@@ -92,6 +96,7 @@ def time_within(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import time_within
     >>> time_within(np.array([0.0, 1.0]), np.array([-1.0, 1.0]), -0.5, 0.25)
     0.375
@@ -126,6 +131,7 @@ def reversals(t: np.ndarray, y: np.ndarray, above: float = 0.0, breaks: np.ndarr
     --------
     Swings of 0.1 on the way do not count as reversals here:
 
+    >>> import numpy as np
     >>> from nlctl.analysis.metrics import reversals
     >>> y = np.array([0.0, 1.0, 0.9, 2.0, 0.0])
     >>> reversals(np.arange(5.0), y), reversals(np.arange(5.0), y, 0.2)
@@ -141,7 +147,7 @@ def reversals(t: np.ndarray, y: np.ndarray, above: float = 0.0, breaks: np.ndarr
     turns = y[moving[:-1][up[1:] != up[:-1]] + 1]
     count, direction = 0.0, 0
     low = high = y[0]
-    for value in np.append(turns, y[-1]):
+    for value in np.concatenate((turns, y[-1:])):
         low, high = min(low, value), max(high, value)
         if direction <= 0 and value - low > above:
             count += direction < 0

@@ -35,7 +35,7 @@ from ..lyapunov.loop.roles import Parts, read_parts
 from ..lyapunov.nussbaum.aftermath import Aftermath, aftermath
 from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LongRun
 
-HELD_GAINS = (1e3, 3e3)  # K of N = -K: what both agree in is that of -3e10
+HELD_GAINS = (5e2, 1e3)  # K of N = -K: what both agree in is that of -3e10; steps grow as K^2
 _BEAT = 20 * np.pi  # s; common period of the reference and of the disturbance
 _LENGTH = 1e-3  # s; the burst lasts a tenth of it
 _FINE, _PASSES = 0.02, 6  # steps of zeta between samples, reached by so many refinements

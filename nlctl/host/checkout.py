@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from importlib.machinery import ModuleSpec
 from importlib.util import spec_from_file_location
+from pathlib import Path
 from types import ModuleType
 
 ANALYSIS = "nlctl.analysis"
@@ -23,6 +24,12 @@ _IS_CHECKOUT = not os.path.isfile(os.path.join(NLCTL_FOLDER, "analysis", "__init
 )
 SOURCES = (NLCTL_FOLDER, NEXT_TO_IT) if _IS_CHECKOUT else (NLCTL_FOLDER,)
 """The folders with all of nlctl's modules."""
+
+
+def file_of_nlctl(name: str) -> Path:
+    """Return where a file of nlctl is, such as ``native/run.py`` or ``analysis/catalogue.py``."""
+    is_next_to_it = _IS_CHECKOUT and name.startswith("analysis/")
+    return Path(os.path.dirname(NEXT_TO_IT) if is_next_to_it else NLCTL_FOLDER) / name
 
 
 class _NextToIt:

@@ -1,35 +1,47 @@
-"""Make the integrators' bitcode that is shipped: ``python -m nlctl.native.ship``.
+"""Make the bitcode that is shipped: ``python -m nlctl.native.ship``.
 
-To be run after every change of the integrators' sources, before it is committed; it takes some
-twenty seconds.  Until then the new sources are compiled by numba on each machine, and a test of
-the everyday suite fails.
+To be run after every change of what it is made of, before that is committed; what still fits is not
+made again.  Until then the new sources are compiled by numba on each machine, and a test of the
+everyday suite fails.
 """
 
 import ast
 import hashlib
+import inspect
 import json
-import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from importlib import import_module
+from pathlib import PurePosixPath
 
 import llvmlite.binding as llvm
 import numba
 
+from ..host.checkout import file_of_nlctl
 from ..host.files import replace_file
-from .integrators import HERE, SHIPPED, WANTED, sources_key
 from .machine.export import exported
+from .machine.machine_code import Wanted
+from .machine.shipped import Shipped, bitcode, sources_key
 
-# files, and what counts of them: "" for everything
-_ROOTS = [(f"integrate/{name}.py", "") for name in ("advance", "start", "workspace")]
-_ROOTS += [("machine/export.py", "exported")]
+SHIPPED = (
+    "nlctl.native.integrators:INTEGRATORS",
+    "nlctl.native.enclosures.search:BOX_SEARCH",
+    "nlctl.native.tubes.tube:TUBES",
+    "nlctl.analysis.metrics.compiled:SAMPLE_FUNCTIONS",
+)
+_MADE_BY = ("native/machine/export.py", "exported")  # a file, and what counts of it
 
 
-def ship(path: Path = SHIPPED) -> None:
-    """Write the bitcode, with what it was made of, to a file."""
-    files, code = source_files(), exported(WANTED)
+def group_by_name(name: str) -> Shipped:
+    """Return one of `SHIPPED`."""
+    module, _, place = name.partition(":")
+    return getattr(import_module(module), place)
+
+
+def ship(group: Shipped) -> None:
+    """Write the bitcode, with what it was made of."""
+    files, code = source_files(group), exported(group.wanted)
     header = {
         "sources": sources_key(files),
         "files": files,
@@ -37,21 +49,28 @@ def ship(path: Path = SHIPPED) -> None:
         "llvm": list(llvm.llvm_version_info),
         "numba": numba.__version__,
     }
-    replace_file(path, lambda file: file.write(json.dumps(header).encode() + b"\n" + code))
+    content = json.dumps(header).encode() + b"\n" + code
+    replace_file(group.path, lambda file: file.write(content))
 
 
-def source_files() -> list[str]:
-    """Return the files of nlctl that the integrators' bitcode is made of, and by."""
-    # Of files elsewhere only what is imported counts, and what that is made of.
-    read, parts = cache(_read), [*_ROOTS]
+def source_files(group: Shipped) -> list[str]:
+    """Return the files of nlctl that bitcode is made of, and by."""
+    # Of a file only what is named counts, and what that is made of, but for those that count whole
+    # and their neighbours.
+    whole = tuple(str(PurePosixPath(name).parent) for name in group.whole)
+    parts = [*((name, "") for name in group.whole), *map(_place, group.wanted), _MADE_BY]
+    read = cache(_read)
     for name, part in parts:  # which grows meanwhile
-        whole = name.startswith("integrate/")
-        parts += [
-            other
-            for other in dict.fromkeys(_made_of(read(HERE / name), "" if whole else part))
-            if other not in parts
-        ]
+        named = "" if name.startswith(whole) else part
+        parts += [o for o in dict.fromkeys(_made_of(read(name), named)) if o not in parts]
     return sorted({name for name, _ in parts})
+
+
+def _place(wanted: Wanted) -> tuple[str, str]:
+    """Return in which file a function is, and its name there."""
+    function = inspect.unwrap(wanted.function)
+    _, _, module = function.__module__.partition(".")
+    return f"{module.replace('.', '/')}.py", function.__name__
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,12 +82,12 @@ class _File:
     statements: Sequence[tuple[set[str], set[str]]]
 
 
-def _read(path: Path) -> _File:
+def _read(place: str) -> _File:
     """Return what stands in a file."""
-    body = ast.parse(path.read_text(encoding="utf-8")).body
+    body = ast.parse(file_of_nlctl(place).read_text(encoding="utf-8")).body
     return _File(
-        place=Path(os.path.relpath(path, HERE)).as_posix(),
-        imported=dict(_imports(path, body)),
+        place=place,
+        imported=dict(_imports(PurePosixPath(place), body)),
         statements=[(_names_in(node, ast.Store), _names_in(node, ast.Load)) for node in body],
     )
 
@@ -87,27 +106,37 @@ def _made_of(file: _File, part: str) -> Iterator[tuple[str, str]]:
 
 def _names_in(node: ast.AST, kind: type[ast.expr_context]) -> set[str]:
     """Return the names that a statement reads, annotations aside, or that it gives a value."""
+    if kind is ast.Store and hasattr(node, "name"):  # not what is inside of a function or a class
+        return {node.name}
     every = list(ast.walk(node))
     notes = [getattr(n, field, None) for n in every for field in ("annotation", "returns")]
+    # a decorator without arguments is taken off before a function is compiled
+    notes += [d for d in getattr(node, "decorator_list", ()) if isinstance(d, ast.Name)]
     aside = {id(part) for note in notes if note is not None for part in ast.walk(note)}
     named = (n for n in every if isinstance(n, ast.Name) and id(n) not in aside)
-    names = {n.id for n in named if isinstance(n.ctx, kind)}
-    return names | ({getattr(node, "name", "")} if kind is ast.Store else set())
+    return {n.id for n in named if isinstance(n.ctx, kind)}
 
 
-def _imports(path: Path, body: list[ast.stmt]) -> Iterator[tuple[str, tuple[str, str]]]:
+def _imports(place: PurePosixPath, body: list[ast.stmt]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield what a file imports from files of nlctl: its name here, the file and its name there."""
     for node in (n for statement in body for n in ast.walk(statement)):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            folder = path.parents[node.level - 1]
-            inner = folder / (node.module or "").replace(".", "/")
-            for each in node.names:
-                module, file = inner / f"{each.name}.py", inner.with_suffix(".py")
-                place = module if module.exists() else file
-                if place.exists() and place.is_relative_to(HERE.parent):
-                    there = Path(os.path.relpath(place, HERE)).as_posix()
-                    yield each.asname or each.name, (there, "" if place is module else each.name)
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        names = (node.module or "").split(".") if node.module else []
+        if node.level:
+            inner = place.parents[node.level - 1].joinpath(*names)
+        elif names[0] == "nlctl":
+            inner = PurePosixPath(*names[1:])
+        else:
+            continue
+        for each in node.names:
+            module, file = inner / f"{each.name}.py", inner.with_suffix(".py")
+            there = module if file_of_nlctl(str(module)).exists() else file
+            if file_of_nlctl(str(there)).exists():
+                yield each.asname or each.name, (str(there), "" if there is module else each.name)
 
 
 if __name__ == "__main__":
-    ship(*map(Path, sys.argv[1:]))
+    for group in map(group_by_name, SHIPPED):
+        if bitcode(group) is None:
+            ship(group)

@@ -27,12 +27,13 @@ from scipy import constants as physics
 
 import nlctl
 from nlctl.errors import CacheWarning, CompileError
-from nlctl.native.integrators import integrator_key
+from nlctl.native.integrators import INTEGRATORS
 from nlctl.native.machine import finish, store
 from nlctl.native.machine import machine_code as machine_code_module
 from nlctl.native.machine.calls import loaded
 from nlctl.native.machine.fingerprint import function_key, module_key
-from nlctl.native.machine.machine_code import TEACHERS, Wanted, kept, machine_code
+from nlctl.native.machine.machine_code import TEACHERS, Wanted, machine_code
+from nlctl.native.machine.shipped import shipped_key
 from nlctl.native.opaque.called import Source
 
 PACKAGE = Path(nlctl.__file__).parent
@@ -280,16 +281,6 @@ class TestMachineCode:
         wanted = Wanted(function=cubed, signature=numba.float32(numba.float32), options={})
         machine_code("cubed", wanted)
         assert len(list(folder.iterdir())) == 3
-
-    def test_code_for_each_type_of_arguments(self, folder):
-        """As `numba.njit` without a signature, for functions of an analysis."""
-        x = np.arange(3.0)
-        assert kept(error_model="numpy")(total)(x) == 3.0
-        assert kept(error_model="numpy")(total)(x[::2]) == 2.0  # another layout
-        with event.install_recorder("numba:compile") as recorder:
-            assert kept(error_model="numpy")(total)(x) == 3.0
-        assert not recorder.buffer
-        assert len(list(folder.iterdir())) == 2
 
     def test_what_holds_an_address_is_not_kept(self, folder):
         """A C function of this process: compiled in every session."""
@@ -544,10 +535,11 @@ def keys_of_copy(path, edits):
         assert source.count(before) == 1
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
-        "import nlctl; from nlctl.native.integrators import integrator_key\n"
+        "import nlctl; from nlctl.native.integrators import INTEGRATORS\n"
+        "from nlctl.native.machine.shipped import shipped_key\n"
         "from nlctl.native.machine.machine_code import TEACHERS\n"
         "from nlctl.native.machine.fingerprint import module_key\n"
-        "print(nlctl.__file__, integrator_key(), module_key(*TEACHERS))"
+        "print(nlctl.__file__, shipped_key(INTEGRATORS), module_key(*TEACHERS))"
     )
     run = subprocess.run(
         [sys.executable, "-c", script], cwd=path, env=os.environ | {"PYTHONPATH": str(path)},
@@ -565,7 +557,7 @@ class TestSources:
     @pytest.mark.slow
     def test_a_copy_has_the_same_keys(self, tmp_path):
         """Paths and processes do not count."""
-        assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TEACHERS)]
+        assert keys_of_copy(tmp_path, {}) == [shipped_key(INTEGRATORS), module_key(*TEACHERS)]
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
@@ -574,12 +566,12 @@ class TestSources:
     )
     def test_an_edit_of_any_module_of_the_integrators(self, tmp_path, name):
         """Constants, coefficients, generated code, options."""
-        before = [integrator_key(), module_key(*TEACHERS)]
+        before = [shipped_key(INTEGRATORS), module_key(*TEACHERS)]
         assert keys_of_copy(tmp_path, {name: EDITS[name]}) != before
 
     def test_use_does_not_change_a_key(self):
         """What a code generator remembers is not a part of it."""
-        before = module_key(*TEACHERS), integrator_key()
+        before = module_key(*TEACHERS), shipped_key(INTEGRATORS)
         for k in range(3):
             scope = source_text.run(
                 f"def helper(v):\n    return {k} * v\n\n\n"
@@ -587,7 +579,7 @@ class TestSources:
             )
             system = ct.nlsys(scope["function"], None, inputs=0, outputs=1, states=1, name="used")
             nlctl.compile(system).native  # noqa: B018
-        assert (module_key(*TEACHERS), integrator_key()) == before
+        assert (module_key(*TEACHERS), shipped_key(INTEGRATORS)) == before
 
     @pytest.mark.weekly
     def test_an_edit_of_a_code_generator(self, tmp_path):
@@ -595,5 +587,5 @@ class TestSources:
         first = "from __future__ import annotations\n"
         edits = {"purity/dicts.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
-        assert integrators == integrator_key()
+        assert integrators == shipped_key(INTEGRATORS)
         assert taught != module_key(*TEACHERS)

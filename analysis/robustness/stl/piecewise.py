@@ -5,12 +5,11 @@ and windows of piecewise linear functions are piecewise linear again, so nothing
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from nlctl.native.machine.machine_code import kept
-
-from ...metrics.curves import path, turning_points
+from ...metrics.compiled import SAMPLE_FUNCTIONS, as_row
 
 
 @dataclass(frozen=True)
@@ -50,8 +49,14 @@ class Trace:
 
 
 _NONE = np.empty(0)
-_compiled = kept(nogil=True, error_model="numpy")
-_vertices, _path = _compiled(turning_points), _compiled(path)
+
+
+def _path(t: Any, y: Any, breaks: Any, apart: float) -> tuple[np.ndarray, np.ndarray]:
+    return SAMPLE_FUNCTIONS.functions["path"](*map(as_row, (t, y, breaks)), apart)
+
+
+def _vertices(t: Any, y: Any, breaks: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return SAMPLE_FUNCTIONS.functions["turning_points"](*map(as_row, (t, y, breaks)))
 
 
 def with_vertices(

@@ -20,8 +20,9 @@ from pathlib import Path
 import llvmlite.binding as llvm
 
 from ...errors import CompileError
-from ...native import integrators
+from ...native.integrators import INTEGRATORS
 from ...native.machine import store
+from ...native.machine.shipped import bitcode
 from ..zig import check_zig, zig
 from .rounding import integrators_alike
 
@@ -159,24 +160,15 @@ def _integrators() -> bytes:
 
 @functools.cache
 def integrators_text() -> str:
-    """Return the integrators' IR for another machine than this one.
-
-    WebAssembly has no common symbols; names of functions, which are thousands of characters, would
-    be most of the object file.
-    """
-    bitcode = integrators.shipped_bitcode()
-    if bitcode is None:
+    """Return the integrators' IR for another machine than this one."""
+    code = bitcode(INTEGRATORS)
+    if code is None:
         raise CompileError(
             "a page that runs needs the integrators' bitcode that nlctl ships, which is not that "
             "of the sources here: python -m nlctl.native.ship"
         )
-    text = str(llvm.parse_bitcode(lzma.decompress(bitcode)))
+    text = str(llvm.parse_bitcode(lzma.decompress(code)))
     text = re.sub(r"^target (triple|datalayout) = .*\n", "", text, flags=re.MULTILINE)
-    text = text.replace("= common global", "= internal global")
     text = text.replace("@llvm.smul.with.overflow.i64", "@size")
     text = re.sub(r"^declare .*@size\(.*\n", _SIZE, text, flags=re.MULTILINE)
-    short: dict[str, str] = {}
-    text = re.sub(
-        r'@"?(_Z[\w.$]+)"?', lambda m: f"@f{short.setdefault(m[1], str(len(short)))}", text
-    )
     return integrators_alike(laid_out_as_here(text))

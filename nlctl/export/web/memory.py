@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...native.integrate.memory import data_address, type_of
+from ...native.integrate.memory import type_of
+from ...native.machine.address import data_address
 
 _NUMBER = 8  # bytes of every number in a run's memory
 

@@ -44,6 +44,7 @@ _WITHIN = 100.0  # tolerances that a state moves in a mean step
 _FARTHER = 10.0  # times as far in an accepted step
 _SLOW = 0.1  # part of the longest window
 _LONG = 8  # windows after which a run is looked at that has not become slow
+_LOOKS, _SELDOM = 8, 100  # so often whatever it does, then once in so many windows at most
 _LEAST = 0.1  # part of the range of the right-hand side that counts as a jump
 _REMAINS = 0.4  # part of it that is still there between neighbours; sign has a half at 0
 _HALVINGS = 200
@@ -51,7 +52,8 @@ _FLAT = 0.25  # part of it by which what does not jump may change
 _BESIDE = 2.0 ** np.arange(4, 22)  # distances between neighbours, any four in a row of which do
 _WAYS = np.random.default_rng(1).choice([-1.0, 1.0], (4, 1000))  # signs, to move a state by
 _PACES = np.dtype(
-    [("t", "f8"), ("longest", "f8"), ("tried", "i8"), ("windows", "i8"), ("slow", "i8")]
+    [("t", "f8"), ("longest", "f8")]
+    + [(name, "i8") for name in ("tried", "windows", "slow", "looks")]
 )
 
 
@@ -65,9 +67,10 @@ def new_paces(lanes: np.ndarray) -> np.ndarray:
 def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     """Return which lanes are to be looked at, at the end of a window."""
     # Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
-    # `_LONG` windows on: what usual runs take must not cost them anything. A window that a turn to
-    # another method cuts short is one together with the next.
-    before, longest, tried, windows, slow = (paces[name] for name in _PACES.names or ())
+    # `_LONG` windows on: what usual runs take must not cost them anything, nor what runs take that
+    # become slow again and again. A window that a turn to another method cuts short is one together
+    # with the next.
+    before, longest, tried, windows, slow, looks = (paces[name] for name in _PACES.names or ())
     status, tried_now = lanes["status"], lanes["accepted"] + lanes["rejected"]
     whole = (tried_now - tried >= WINDOW) & ((status == RUNNING) | (status == METHOD))
     gone = lanes["t"] - before
@@ -77,7 +80,10 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     windows += whole
     slow[whole] = (slow[whole] + 1) * (gone < _SLOW * longest)[whole]
     due = [(n & (n - 1)) == 0 for n in (windows, slow)]
-    return whole & ((due[0] & (windows >= _LONG)) | ((slow > 0) & due[1]))
+    due[1] &= (slow > 0) & (looks < _LOOKS + windows // _SELDOM)
+    looked_at = whole & ((due[0] & (windows >= _LONG)) | due[1])
+    looks += looked_at
+    return looked_at
 
 
 def probe_of(task: Task) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,9 +95,13 @@ class LaneEquations:
         g = np.array([self.switching(*point) for point in points])
         return Way(points=points, rates=np.array([a.first[:, self.j] for a in made]), g=g)
 
-    def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
+    @cached_property
+    def _values(self) -> Any:
         machine = self.run.machine
-        dx, g, m = machine.values(machine.rhs, "dx g m", (t, x, u), self.c)
+        return machine.at_points(machine.rhs, "dx g m", self.c)
+
+    def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
+        dx, g, m = self._values(t, x, u)
         dx[self.run.task.rows.memory] = 0.0
         return dx, g, m
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .boxes import BoxCode
-from .search import ALL_PROVED, FULL, REFUTED, prove_below, supremum
+from .search import ALL_PROVED, BOX_SEARCH, FULL, REFUTED
 from .writer import LANES
 
 _ROOM = 2_048  # boxes for which there is room to begin with
@@ -101,7 +101,7 @@ class _Search:
     def run(self, most: int) -> int:
         """Judge boxes until there are so many, or none is left."""
         rows = self.code.rows
-        places = (rows.centre, rows.weight)
+        places, prove_below = (rows.centre, rows.weight), BOX_SEARCH.functions["prove_below"]
         while True:
             self.status = prove_below(
                 self.code.judge, places, *self.room, self.stack, self.whole, self.bound, most,
@@ -152,6 +152,7 @@ def enclose_supremum(
     counts, bounds = np.array([1, 0, 1, 0, 0]), np.array([-np.inf, -np.inf])
     rows, room, whole = code.rows, _room(code), _widths(box)
     limits = (float(tol), float(relative), int(max_boxes), int(hopeless))
+    supremum = BOX_SEARCH.functions["supremum"]
     while True:
         status = supremum(
             code.judge, (rows.centre, rows.weight), *room, nodes, index, keys, whole, limits,

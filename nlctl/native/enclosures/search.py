@@ -4,17 +4,24 @@ Boxes are taken from a stack, or a heap, as many together as there are lanes.  W
 depends on no thread and on no other search.
 """
 
+from __future__ import annotations
+
 import math
 
+import numba
+from numba import types
+
+from ...host.checkout import file_of_nlctl
 from ..machine.address import call_enclosure
-from ..machine.machine_code import kept
+from ..machine.machine_code import Wanted
+from ..machine.shipped import Shipped
 
 ALL_PROVED, REFUTED, LEFT, FULL = range(4)
 FINEST = 1e-6  # of a tolerance: where the bound is near 0, nothing finer is tried
-_INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
+_INNER = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-@kept(**_INNER)
+@numba.njit(**_INNER)
 def best_side(x, o, lane, weight, whole):
     """Return the side that matters most and can be divided; -1 for none."""
     best, side, n, known = -1.0, -1, whole.size, True
@@ -30,7 +37,6 @@ def best_side(x, o, lane, weight, whole):
     return side
 
 
-@kept(nogil=True, error_model="numpy")
 def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
     """Prove or refute that the least of some functions is at most a bound on boxes."""
     # Shapes: `x, o` (rows, lanes), `stack` (boxes, 2 sides), `whole` (sides,), `point` (sides +
@@ -75,7 +81,6 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
     return LEFT if top > 0 or counts[2] > 0 else ALL_PROVED
 
 
-@kept(nogil=True, error_model="numpy")
 def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, bounds):
     """Enclose the supremum of the least of some functions on a box."""
     # Shapes: `nodes` (boxes, 2 sides), `index` (3, boxes), `keys` (boxes,).
@@ -92,7 +97,7 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, bou
     return ALL_PROVED
 
 
-@kept(**_INNER)
+@numba.njit(**_INNER)
 def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds):
     """Judge the boxes that wait, and put them into the heap."""
     n, lanes, waiting = whole.size, x.shape[1], counts[0]
@@ -117,7 +122,7 @@ def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds
         counts[1] = heap_enter(keys, index, counts[1], o[0, lane], j)
 
 
-@kept(**_INNER)
+@numba.njit(**_INNER)
 def divide_first(nodes, index, keys, lanes, limits, counts, bounds):
     """Divide the boxes with the largest bounds: their halves wait."""
     tol, relative, most, hopeless = limits
@@ -143,7 +148,7 @@ def divide_first(nodes, index, keys, lanes, limits, counts, bounds):
         counts[0] += 2
 
 
-@kept(**_INNER)
+@numba.njit(**_INNER)
 def heap_enter(keys, index, size, key, what):
     """Put a box into the heap, the largest bound first, and return its size."""
     at = size
@@ -157,7 +162,7 @@ def heap_enter(keys, index, size, key, what):
     return size + 1
 
 
-@kept(**_INNER)
+@numba.njit(**_INNER)
 def heap_leave(keys, index, size):
     """Take the first box out of the heap, and return its size."""
     size -= 1
@@ -174,3 +179,24 @@ def heap_leave(keys, index, size):
         at = down
     keys[at], index[1, at] = key, what
     return size
+
+
+_REAL, _COUNT = types.float64, types.int64
+_ROW, _TABLE, _COUNTS = _REAL[::1], _REAL[:, ::1], _COUNT[::1]
+_CODE = (types.intp, types.UniTuple(_COUNT, 2), _TABLE, _TABLE)  # and the places and rows of boxes
+_LIMITS = types.Tuple((_REAL, _REAL, _COUNT, _COUNT))
+BOX_SEARCH = Shipped(
+    path=file_of_nlctl("native/enclosures/search.bitcode"),
+    wanted=(
+        Wanted(
+            function=prove_below,
+            signature=_COUNT(*_CODE, _TABLE, _ROW, _REAL, _COUNT, _COUNTS, _ROW),
+            options=_INNER,
+        ),
+        Wanted(
+            function=supremum,
+            signature=_COUNT(*_CODE, _TABLE, _COUNT[:, ::1], _ROW, _ROW, _LIMITS, _COUNTS, _ROW),
+            options=_INNER,
+        ),
+    ),
+)

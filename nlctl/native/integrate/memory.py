@@ -7,12 +7,11 @@ time of a run.
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import math
 import struct
 from collections.abc import Iterator
-from typing import Annotated, Any, cast, get_origin, get_type_hints
+from typing import Annotated, Any, get_origin, get_type_hints
 
 import numba
 import numpy as np
@@ -27,9 +26,9 @@ from ...upstream.numba_internals import (
     pack_array,
     populate_array,
 )
+from ..machine.address import data_address
 
 _INT = ir.IntType(64)
-_ANY = ctypes.c_char  # of any data
 _LINE = 8  # floats in a line of the cache
 _FLOAT, _BITS = struct.Struct("=d"), struct.Struct("=q")
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
@@ -101,15 +100,6 @@ def _entry(record: Any, name: str, value: Any, dtype: Any, ndim: int) -> tuple[i
     if not value.flags.c_contiguous:
         raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
     return (data_address(value), *value.shape, *_REST[ndim])
-
-
-def data_address(array: np.ndarray) -> int:
-    """Return where a contiguous array begins; one without elements begins nowhere."""
-    if not array.size:
-        return 0
-    if not array.flags.writeable:
-        return array.ctypes.data
-    return ctypes.addressof(_ANY.from_buffer(cast(Any, array)))  # several times as fast
 
 
 def _number(record: Any, name: str, value: Any) -> int:

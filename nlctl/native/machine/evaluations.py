@@ -59,16 +59,28 @@ class Machine:
         """What integrators take of `rhs` and `out`."""
         return entry(self.rhs), entry(self.out)
 
+    def at_points(
+        self, function: Callable[..., Any], names: str, c: np.ndarray
+    ) -> Callable[[Any, Any, Any], list[np.ndarray]]:
+        """Return what makes a function's arrays of these names of t, x and u, `c` in every lane."""
+        points = [np.zeros(self.lowered.shape(name)) for name in "txu"]
+        results = [np.zeros((self.lowered.rows[name], self.width)) for name in names.split()]
+        arrays = (*points, c, *results)
+        call = function.bound(*arrays) if isinstance(function, Routine) else None
+
+        def values(t: Any, x: Any, u: Any) -> list[np.ndarray]:
+            for array, value in zip(points, (t, x, u), strict=True):
+                array[:] = np.reshape(value, (*array.shape[:-1], 1))
+            call() if call else function(*arrays)
+            return [array[:, -1].copy() for array in results]
+
+        return values
+
     def values(
         self, function: Callable[..., Any], names: str, point: Any, c: np.ndarray
     ) -> list[np.ndarray]:
-        """Return what a function makes of t, x and u, `c` in every lane: arrays of these names."""
-        t, x, u = (np.ascontiguousarray(v, dtype=float).reshape(-1, 1) for v in point)
-        if self.width > 1:
-            t, x, u = (np.repeat(v, self.width, axis=1) for v in (t, x, u))
-        results = [np.zeros((self.lowered.rows[name], self.width)) for name in names.split()]
-        function(t[0], x, u, c, *results)
-        return [array[:, -1] for array in results]
+        """Return what a function makes of one point (t, x, u), see `at_points`."""
+        return self.at_points(function, names, c)(*point)
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""

@@ -7,7 +7,7 @@ by function, without vectorisation and inlining.  `finish` does the rest, in a t
 Relied on in the IR that numba makes, and held by a test each:
 
 - a function takes pointers for the result and for an exception, then the arguments, and returns
-  `_RETURNED` or `NONE`, or the number of an exception;
+  `RETURNED` or `NONE`, or the number of an exception;
 - memory of arrays is asked for by ``NRT_MemInfo_alloc_aligned`` and given back by
   ``NRT_MemInfo_call_dtor``; `_MEMORY` has both in terms of the C library, with numba's layout.
 """
@@ -22,11 +22,15 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 
+from ...errors import CompileError
 from ...upstream.numba_internals import called_libraries, name_and_library, own_ir
 from .machine_code import Wanted
 
-_RETURNED, NONE = 0, -2
+RETURNED, NONE = 0, -2
+RELEASE = "NRT_MemInfo_call_dtor"  # what gives memory back, can be called from outside as well
+_ELSEWHERE = ("NRT_", "numba_", "Py")  # functions that only a process with numba and Python has
 _LONG = 80  # lines of IR from which on a function is not inlined: twice the compile time, no gain
+_MANGLED = r'@"?(_Z[\w.$]+)"?'
 _MEMORY = """
 declare ptr @malloc(i64)
 declare void @free(ptr)
@@ -63,7 +67,7 @@ def exported(requests: Sequence[Wanted]) -> bytes:
         for request in requests:
             code: Any = numba.njit(request.signature, **request.options)(request.function)
             name, library = name_and_library(code)
-            names[name] = request.function.__name__
+            names[name] = request.called
             libraries.append(library)
     reached: dict[int, Any] = {}
     for library in libraries:
@@ -91,7 +95,8 @@ def _named(module: Any, names: dict[str, str]) -> Any:
     # machine that makes the module.
     for function in module.functions:
         if not function.is_declaration:
-            function.linkage = "external" if function.name in names else "internal"
+            is_called = function.name in names or function.name == RELEASE
+            function.linkage = "external" if is_called else "internal"
     text = re.sub(r"store ptr @\.const\.picklebuf[\w.]+", "store ptr null", str(module))
     for mangled, name in names.items():
         text = re.sub(rf'@"?{re.escape(mangled)}"?(?![\w.$"])', f"@{name}", text)
@@ -119,10 +124,13 @@ def _simplify(module: Any) -> None:
     passes.add_global_dead_code_eliminate_pass()
     passes.run(module, all_of_it)
     module.verify()
+    for function in module.functions:
+        if function.name.startswith(_ELSEWHERE) and function.is_declaration:
+            raise CompileError(f"code to be shipped calls '{function.name}', which only numba has")
 
 
 def _apart(module: Any, entries: Iterable[str]) -> Any:
-    """Return a module whose long functions are not inlined."""
+    """Return a module whose long functions are not inlined, by short names."""
     # As text: some versions of llvmlite give the attribute to the result.
     text = str(module)
     for function in module.functions:
@@ -131,7 +139,11 @@ def _apart(module: Any, entries: Iterable[str]) -> Any:
             place = rf'(\ndefine [^\n]*@"?{re.escape(function.name)}"?\([^\n]*\)[^\n{{]*)\{{'
             text, count = re.subn(place, r"\1noinline {", text)
             assert count == 1, function.name
-    return llvm.parse_assembly(text)
+    # Mangled names are thousands of characters, and some have an address of this process. What
+    # numba leaves for several modules to share is this one's.
+    numbers: dict[str, str] = {}
+    text = re.sub(_MANGLED, lambda m: f"@f{numbers.setdefault(m[1], str(len(numbers)))}", text)
+    return llvm.parse_assembly(text.replace("= common ", "= internal "))
 
 
 def _builder(machine: object, speed: int) -> Any:

@@ -30,7 +30,7 @@ from ...upstream.numba_internals import (
 )
 from ..purity import dicts
 from . import address, store
-from .fingerprint import function_key, module_key
+from .fingerprint import module_key
 
 TEACHERS = (address, dicts)  # they extend numba; functions do not name them
 
@@ -42,6 +42,12 @@ class Wanted:
     function: Callable[..., Any]  # plain Python
     signature: Any
     options: Mapping[str, Any]  # of `numba.njit`
+    name: str = ""  # what it is called by, if not as the function is
+
+    @property
+    def called(self) -> str:
+        """What it is called by."""
+        return self.name or self.function.__name__
 
 
 def machine_code(key: str, request: Wanted) -> Any:
@@ -69,18 +75,6 @@ def machine_code_if_taken(key: str, request: Wanted) -> Any:
     except Exception:  # numba passes on whatever typing raises
         pass
     return None
-
-
-def kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator like `numba.njit`, whose code for each type of arguments is kept."""
-
-    def decorate(function: Callable[..., Any]) -> Any:
-        code: Any = numba.njit(**options)(function)
-        if not is_jit_disabled():
-            give_cache(code, _Stored(lambda types: store_key(function_key(code), str(types))))
-        return code
-
-    return decorate
 
 
 class _Stored(CodeCache):

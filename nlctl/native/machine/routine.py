@@ -13,6 +13,7 @@ from ..codegen.interpret import interpreted_function
 from ..codegen.solver import plain_solver
 from ..lower import Lowered
 from ..opaque.called import Call
+from .address import data_address
 from .calls import CALL_FAILED, Native, native_calls, plain_calls
 from .finish import Loaded, finished
 
@@ -50,7 +51,7 @@ class Routine:
             fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
             if not fits:
                 raise ValueError(f"an array of shape {shape} is needed, got {array.shape}")
-        function, places = self._function, [array.ctypes.data for array in arrays]
+        function, places = self._function, [data_address(array) for array in arrays]
 
         def call() -> None:
             function(*places)

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...upstream.numba_internals import is_jit_disabled
-from ..integrate.memory import data_address, with_fields
+from ..integrate.memory import with_fields
 from ..integrate.state import LANE, OK, RUNNING
 from ..integrators import handle, integrators
+from ..machine.address import data_address
 from .held import HeldRun
 from .window import HELD_STEPS, TIMES_ROW, Window, in_one_piece, memory_size
 

@@ -12,8 +12,9 @@ import numpy as np
 from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
 from ..driver import Course, prepared
-from ..integrate.memory import data_address, named_arrays, type_of, with_fields
+from ..integrate.memory import named_arrays, type_of, with_fields
 from ..integrate.workspace import Task
+from ..machine.address import data_address
 from ..run import Run
 from ..settings import Settings
 

@@ -6,30 +6,25 @@ rounding of it.  What is not a number, or overflows, makes both ends not a numbe
 
 from __future__ import annotations
 
-from ..machine.machine_code import kept
+import numba
 
 _PART, _TINY = 2.0**-51, 2.0**-1070
-AS_NUMPY = {
-    "nogil": True,
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
+AS_NUMPY = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def down(v):
     """Return a lower bound of what was rounded to v."""
     return v - (abs(v) * _PART + _TINY)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def up(v):
     """Return an upper bound of what was rounded to v."""
     return v + (abs(v) * _PART + _TINY)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def interval_product(a, b, c, d):
     """Return the ends of [a, b] [c, d]."""
     p, q, r, s = a * c, a * d, b * c, b * d
@@ -40,21 +35,21 @@ def interval_product(a, b, c, d):
     return down(low) + known, up(high) + known
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def add_product(s, a, b, c, d):
     """Add [a, b] [c, d] to the interval s, of shape (2,)."""
     low, high = interval_product(a, b, c, d)
     s[0], s[1] = down(s[0] + low), up(s[1] + high)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def write_into(a, b):
     """Write one array into another: a[:] = b takes five times as long to compile."""
     for i in range(b.size):
         a.flat[i] = b.flat[i]
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def power_of_time(h, k, s):
     """Write [0, h]^k for k > 0 to s, and return bounds of h^k."""
     low = high = h
@@ -64,7 +59,7 @@ def power_of_time(h, k, s):
     return low, high
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def matrix_product(x, y, z):
     """Write the product of matrices of intervals, each of shape (n, m, 2), to z."""
     for i in range(x.shape[0]):
@@ -74,7 +69,7 @@ def matrix_product(x, y, z):
                 add_product(z[i, j], x[i, k, 0], x[i, k, 1], y[k, j, 0], y[k, j, 1])
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def add_image(x, y, z):
     """Add the product of a matrix (n, m, 2) and a vector (m, 2) to z."""
     for i in range(x.shape[0]):

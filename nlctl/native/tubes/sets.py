@@ -14,16 +14,16 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 
-from ..machine.machine_code import kept
 from .intervals import AS_NUMPY, add_image, add_product, down, matrix_product, up, write_into
 
 _ROUNDED = 1e-13  # of all terms of a sum of less than 800
 _UP = 1.0 + 1e-12  # what sums of sizes may be rounded by
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def box_of_set(c, P, even, B, r, box):
     """Write the box around a set."""
     write_into(box, c)
@@ -36,7 +36,7 @@ def box_of_set(c, P, even, B, r, box):
     add_image(B, r, box)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def sizes(P, degrees, by_degree, whole):
     """Write the sums of the coefficients' sizes, of each degree and of all."""
     by_degree.fill(0.0)
@@ -46,11 +46,11 @@ def sizes(P, degrees, by_degree, whole):
         whole[i] = by_degree[i].sum() * _UP
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def next_polynomials(J, H, P, table, error):
     """Carry polynomials on, in place, and add what that leaves out to errors."""
     # Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
-    n, degree = P.shape[0], table.degrees.max()
+    n, degree = P.shape[0], table.degrees[-1]  # the last one has the highest
     by_degree, whole = np.zeros((n, degree + 1)), np.zeros(n)
     sizes(P, table.degrees, by_degree, whole)
     carried, left = np.zeros_like(P), np.zeros(n)
@@ -81,7 +81,7 @@ def next_polynomials(J, H, P, table, error):
         error[k, 0], error[k, 1] = down(error[k, 0] - around), up(error[k, 1] + around)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def polynomial_product(p, q, products, p_sizes, q_sizes, product):
     """Multiply polynomials, and return how large the product is beyond their degree at most."""
     product.fill(0.0)
@@ -94,7 +94,7 @@ def polynomial_product(p, q, products, p_sizes, q_sizes, product):
     return beyond * _UP
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def slopes_within(J, H, box, middle, K):
     """Write J + H d for all d between the middle and a box."""
     # With d = p + e, H (d, d) / 2 is H (p, p) / 2 and H (p + e / 2) e, and p + e / 2 is one of
@@ -108,7 +108,7 @@ def slopes_within(J, H, box, middle, K):
                 add_product(K[k, i], H[k, i, j, 0], H[k, i, j, 1], first, last)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def next_errors(K, error, at, c, B, r):
     """Move errors, in place: those of `r`, with `error` added; `c` becomes what is around `at`."""
     # Shapes: `K, B` (n, n, 2), `error, c, r` (n, 2), `at` (n,).
@@ -120,7 +120,7 @@ def next_errors(K, error, at, c, B, r):
         for i in range(n):
             columns[i, j] = (0.5 * KB[i, j, 0] + 0.5 * KB[i, j, 1]) * (r[j, 1] - r[j, 0])
     orthogonal(columns, B)
-    transposed = np.ascontiguousarray(B.transpose(1, 0, 2))
+    transposed = transpose(B)
     matrix_product(transposed, KB, rotated)
     whole, errors = error.copy(), np.zeros((n, 2))
     add_image(KB, r, whole)
@@ -135,7 +135,18 @@ def next_errors(K, error, at, c, B, r):
     add_left_out(B, transposed, whole, c)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
+def transpose(x):
+    """Return the transpose of a matrix of intervals, of shape (n, n, 2)."""
+    y = np.empty_like(x)
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            for end in range(2):
+                y[j, i, end] = x[i, j, end]
+    return y
+
+
+@numba.njit(**AS_NUMPY)
 def add_left_out(B, transposed, x, c):
     """Add x - B B^T x, which is 0 but for rounding, to c."""
     n = x.shape[0]
@@ -148,7 +159,7 @@ def add_left_out(B, transposed, x, c):
     add_image(errors, x, c)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def renewed(c, P, even, B, r, most):
     """Begin with new numbers s where errors have become larger than a part of the polynomials."""
     # Return whether. What was there lies in a box along orthogonal directions, with a number for
@@ -167,11 +178,11 @@ def renewed(c, P, even, B, r, most):
             columns[i, j] = P[i, j]
             columns[i, n + j] = B[i, j, 0] * (r[j, 1] - r[j, 0]) * 0.5
     orthogonal(columns, Q)
-    transposed = np.ascontiguousarray(Q.transpose(1, 0, 2))
+    transposed = transpose(Q)
     matrix_product(transposed, B, rotated)
     box, whole = np.zeros((n, 2)), np.empty((n, 2))
     box_of_set(np.zeros((n, 2)), P, even, B, r, whole)
-    box_of_set(box, np.ascontiguousarray(transposed[:, :, 0]) @ P, even, rotated, r, box)
+    box_of_set(box, in_directions(Q, P), even, rotated, r, box)
     for i in range(n):
         rounded = 0.0
         for k in range(n):
@@ -193,7 +204,18 @@ def renewed(c, P, even, B, r, most):
     return True
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
+def in_directions(Q, P):
+    """Return polynomials along orthogonal directions, without what is rounded."""
+    parts = np.zeros(P.shape)
+    for i in range(P.shape[0]):
+        for k in range(P.shape[0]):
+            for a in range(P.shape[1]):
+                parts[i, a] += Q[k, i, 0] * P[k, a]
+    return parts
+
+
+@numba.njit(**AS_NUMPY)
 def orthogonal(columns, B):
     """Write orthogonal directions of columns, a matrix (n, m), those that matter most first."""
     n = columns.shape[0]
@@ -230,7 +252,7 @@ def orthogonal(columns, B):
                 rest[i, j] -= part * B[i, place, 0]
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def _without(v, B, count):
     """Take away what a vector has of the first columns, and return its length."""
     for _ in range(2):

@@ -8,10 +8,14 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numba
 import numpy as np
+from numba import types
 
+from ...host.checkout import file_of_nlctl
 from ..enclosures.writer import LANES
-from ..machine.machine_code import kept
+from ..machine.machine_code import Wanted
+from ..machine.shipped import Shipped
 from .intervals import (
     AS_NUMPY,
     add_image,
@@ -92,14 +96,13 @@ def tube_from(
     table = monomials(n, SET_DEGREE)
     low, high = np.full((cells, n), np.inf), np.full((cells, n), -np.inf)
     end, weight = np.empty((n, 2)), np.zeros(n)
-    status, time, steps = integrated(
+    status, time, steps = TUBES.functions["integrated"](
         code.addresses, code.places, code.folds, table, box, float(duration),
         np.array(limits, dtype=float), FIRST_ORDER, TOLERANCE, LANES, low, high, end, weight,
     )  # fmt: skip
     return Tube(status=status, time=time, low=low, high=high, end=end, weight=weight, steps=steps)
 
 
-@kept(nogil=True, error_model="numpy")
 def integrated(
     code, places, folds, table, box, duration, limits, order, tol, lanes, low, high, end, weight
 ):
@@ -146,7 +149,7 @@ def integrated(
     return status, early, steps
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, pad, read, first):
     """Return the size of a step for which there is a rest, at most `most`; 0 for none."""
     groups, n, lanes = boxes.shape[0], boxes.shape[1] // 4, boxes.shape[3]
@@ -163,7 +166,7 @@ def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, 
     return 0.0
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def first_set(box, count):
     """Return the set {c + P(s) + B r} that is a box, of so many monomials."""
     n = box.shape[0]
@@ -177,7 +180,7 @@ def first_set(box, count):
     return c, P, B, r
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def carry_on(lanes, table, box, middle, c, P, B, r):
     """Carry a set on by a step, in place."""
     n = middle.size
@@ -194,7 +197,7 @@ def carry_on(lanes, table, box, middle, c, P, B, r):
     next_errors(K, error, point, c, B, r)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def step_size(k, order, lane, n, tol):
     """Return the step at which the last coefficients of the middle count for a tolerance."""
     scale, last, before = 0.0, 0.0, 0.0
@@ -208,7 +211,7 @@ def step_size(k, order, lane, n, tol):
     return min(one, other)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def span(k, ky, order, h, boxes, over):
     """Write where the states are during a step: in the first lane, which has the whole set."""
     power = np.empty(2)
@@ -222,7 +225,7 @@ def span(k, ky, order, h, boxes, over):
         over[i, 1] = up(boxes[i, 1, 0] + high)
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def range_over_step(ky, h, begin, end, over):
     """Narrow where the states are during a step, by where they are before and after it."""
     # A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second
@@ -234,7 +237,7 @@ def range_over_step(ky, h, begin, end, over):
         over[i, 1] = min(over[i, 1], up(max(begin[i, 1], end[i, 1]) + above))
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def write_limits(over, begin, end, low, high):
     """Enter a box into the parts of the time that a step has to do with."""
     cells = low.shape[0]
@@ -246,7 +249,7 @@ def write_limits(over, begin, end, low, high):
             high[cell, i] = max(high[cell, i], over[i, 1])
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def judged(over, end, limits):
     """Say what is known of the limits, from a step and from where it ends."""
     status = REACHED
@@ -261,14 +264,14 @@ def judged(over, end, limits):
     return status
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def back_to(end, rates, beyond):
     """Take back what the last step may have gone beyond the end."""
     for i in range(end.shape[0]):
         add_product(end[i], -beyond, 0.0, rates[i, 0, 0], rates[i, 1, 0])
 
 
-@kept(**AS_NUMPY)
+@numba.njit(**AS_NUMPY)
 def matter(P, table, box, weight):
     """Write how much each side of the first box has to do with what is not linear in it."""
     for j in range(weight.size):
@@ -277,3 +280,24 @@ def matter(P, table, box, weight):
             if table.has[a, j] and box[j, 0] < box[j, 1]:
                 part = 1.0 if table.degrees[a] > 1 else 1e-6  # of a linear motion that alone
                 weight[j] += part * np.abs(P[:, a]).sum()
+
+
+_REAL, _COUNT = types.float64, types.int64
+_ROW, _TABLE = _REAL[::1], _REAL[:, ::1]
+_MONOMIALS = types.NamedTuple(
+    (_COUNT[::1], types.boolean[::1], _COUNT[:, ::1], types.boolean[:, ::1]), MonomialTable
+)
+TUBES = Shipped(
+    path=file_of_nlctl("native/tubes/tubes.bitcode"),
+    wanted=(
+        Wanted(
+            function=integrated,
+            signature=types.Tuple((_COUNT, _REAL, _COUNT))(
+                types.UniTuple(types.intp, 2), types.UniTuple(_COUNT, 7), _COUNT[:, ::1],
+                _MONOMIALS, _TABLE, _REAL, _TABLE, _COUNT, _REAL, _COUNT, _TABLE, _TABLE, _TABLE,
+                _ROW,
+            ),
+            options=AS_NUMPY,
+        ),
+    ),
+)  # fmt: skip

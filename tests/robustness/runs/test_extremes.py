@@ -189,17 +189,78 @@ def test_settling_dwelling_and_travel_see_jumps_where_they_are():
     assert metrics.total_variation(t, y, breaks) == pytest.approx(way, abs=1e-9)
 
 
-@pytest.mark.weekly
-def test_numbers_with_breaks_are_the_same_in_machine_code():
-    t = np.linspace(0, 5, 301)
-    y = np.where(t < 2.2222, np.sin(4 * t), -0.5 * np.cos(t))
-    breaks = np.array([2.2222])
-    for function in some([
-        metrics.highest, metrics.lowest, metrics.peak, metrics.spread, metrics.total_variation,
-        partial(metrics.settling_time, band=0.6), partial(metrics.reversals, above=0.1),
-    ], part=7):  # fmt: skip
-        plain, fast = function(t, y, breaks=breaks), in_machine_code(function)(t, y, breaks=breaks)
-        assert fast == pytest.approx(plain, rel=1e-12)
+T = np.linspace(0, 5, 301)
+FUNCTIONS = [
+    *(getattr(metrics, name) for name in (
+        "final", "highest", "lowest", "peak", "spread", "ultimate_bound", "integral", "rms",
+        "absolute_integral", "square_integral", "time_weighted_integral", "total_variation",
+        "reversals",
+    )),
+    partial(metrics.settling_time, band=0.6), partial(metrics.reversals, above=0.1),
+    partial(metrics.time_within, lower=-0.2, upper=0.3), partial(metrics.ultimate_bound, share=0.5),
+]  # fmt: skip
+SIGNALS = {
+    "jumps": np.where(T < 2.2222, np.sin(4 * T), -0.5 * np.cos(T)),
+    "constant": np.full(T.size, 0.25),
+    "NaN": np.where(T[7] == T, np.nan, np.sin(T)),
+    "inf": np.where(T[-1] == T, np.inf, np.sin(T)),
+    "-inf": np.where(T[0] == T, -np.inf, np.sin(T)),
+    "strided": np.repeat(np.sin(3 * T), 2)[::2],
+    "integers": np.round(3 * np.sin(T)).astype(int),
+}
+
+
+@pytest.mark.parametrize("signal", SIGNALS)
+@pytest.mark.parametrize("breaks", [{}, {"breaks": None}, {"breaks": [2.2222]}, {"breaks": NONE}])
+def test_numbers_are_the_same_in_machine_code(signal, breaks):
+    """With breaks and without, of any arrays, also where the number is not a finite one."""
+    y = SIGNALS[signal]
+    for function in FUNCTIONS:
+        given = breaks if metrics.with_breaks(function, NONE) is not function else {}
+        with np.errstate(invalid="ignore"):  # 0 times -inf
+            plain, fast = function(T, y, **given), in_machine_code(function)(T, y, **given)
+        np.testing.assert_allclose(fast, plain, rtol=1e-12, atol=1e-13, err_msg=str(function))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ((T, T), {}),
+        ((T, T, 1.0, NONE, 2.0), {}),
+        ((T, T, 1.0), {"band": 2.0}),
+        ((T, T, 1.0), {"braeks": NONE}),
+    ],
+    ids=["missing", "too many", "twice", "misspelt"],
+)
+def test_what_is_wrong_is_said_in_the_same_words(arguments):
+    given, named = arguments
+    with pytest.raises(Exception) as plain:  # noqa: PT011
+        metrics.settling_time(*given, **named)
+    with pytest.raises(type(plain.value)) as fast:
+        in_machine_code(metrics.settling_time)(*given, **named)
+    assert str(fast.value) == str(plain.value)
+
+
+@pytest.mark.parametrize(
+    ("function", "t", "y"),
+    [
+        (metrics.integral, T, T[:-1]),
+        (metrics.highest, T, T[:-1]),
+        (metrics.highest, T[:0], T[:0]),
+    ],
+)
+def test_samples_that_do_not_fit_never_get_to_machine_code(function, t, y):
+    with pytest.raises(Exception) as plain:  # noqa: PT011
+        function(t, y)
+    with pytest.raises(type(plain.value)) as fast:
+        in_machine_code(function)(t, y)
+    assert str(fast.value) == str(plain.value)
+
+
+def test_what_is_not_one_of_these_functions_is_returned():
+    """Also an object that has no hash."""
+    unhashable = type("Own", (), {"__call__": lambda *_: 0.0, "__eq__": lambda *_: False})()
+    assert in_machine_code(unhashable) is unhashable
 
 
 def test_a_path_goes_through_samples_and_limits():
