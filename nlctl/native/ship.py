@@ -106,8 +106,8 @@ def _made_of(file: _File, part: str) -> Iterator[tuple[str, str]]:
 
 def _names_in(node: ast.AST, kind: type[ast.expr_context]) -> set[str]:
     """Return the names that a statement reads, annotations aside, or that it gives a value."""
-    if kind is ast.Store and hasattr(node, "name"):  # not what is inside of a function or a class
-        return {node.name}
+    if kind is ast.Store and isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return {node.name}  # not what is inside of it
     every = list(ast.walk(node))
     notes = [getattr(n, field, None) for n in every for field in ("annotation", "returns")]
     # a decorator without arguments is taken off before a function is compiled

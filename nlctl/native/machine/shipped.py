@@ -35,6 +35,7 @@ from .fingerprint import function_key
 from .finish import Loaded, finished
 from .machine_code import Wanted, store_key
 
+_TUPLE: Any = types.BaseTuple  # also those with names
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
 _PLAIN = {types.float64: ctypes.c_double, types.int64: ctypes.c_int64, types.boolean: ctypes.c_bool}
 
@@ -135,8 +136,8 @@ def callable_at(address: int, signature: Any, release: Any, owner: Loaded) -> Ca
 
 def _kinds(kind: Any) -> Iterator[Any]:
     """Yield as what an argument is passed."""
-    if isinstance(kind, types.BaseTuple):
-        for item in kind:
+    if isinstance(kind, _TUPLE):
+        for item in kind.types:
             yield from _kinds(item)
     elif isinstance(kind, types.Array):
         yield from _ARRAY
@@ -150,8 +151,8 @@ _ARRAY = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_ssize_t, ctypes.c_ssize_t, 
 
 def _reader(kind: Any) -> Callable[[Any], Iterable[Any]]:
     """Return how a value is passed."""
-    if isinstance(kind, types.BaseTuple):
-        readers = [_reader(item) for item in kind]
+    if isinstance(kind, _TUPLE):
+        readers = [_reader(item) for item in kind.types]
         return lambda value: [
             number for read, item in zip(readers, value, strict=True) for number in read(item)
         ]
@@ -184,8 +185,8 @@ def _structure(kind: Any) -> Any:
         lengths = ctypes.c_ssize_t * kind.ndim
         fields = [*(("memory", "parent", "size", "itemsize", "data")), "shape", "strides"]
         pairs = list(zip(fields, (*_ARRAY, lengths, lengths), strict=True))
-    elif isinstance(kind, types.BaseTuple):
-        pairs = [(f"item{i}", _structure(item)) for i, item in enumerate(kind)]
+    elif isinstance(kind, _TUPLE):
+        pairs = [(f"item{i}", _structure(item)) for i, item in enumerate(kind.types)]
     else:
         return _PLAIN[kind]
     return type("Written", (ctypes.Structure,), {"_fields_": pairs})
@@ -200,9 +201,9 @@ def _value(kind: Any, written: Any, release: Any) -> Any:
     """Return a result as Python has it; its memory is given back."""
     if isinstance(kind, types.Array):
         return _copied(kind, written, release)
-    if isinstance(kind, types.BaseTuple):
+    if isinstance(kind, _TUPLE):
         return tuple(
-            _value(item, getattr(written, f"item{i}"), release) for i, item in enumerate(kind)
+            _value(item, getattr(written, f"item{i}"), release) for i, item in enumerate(kind.types)
         )
     return None if kind == types.none else written
 
@@ -211,7 +212,7 @@ def _copied(kind: Any, written: Any, release: Any) -> np.ndarray:
     dtype, shape = as_dtype(kind.dtype), tuple(written.shape)
     array = np.empty(shape, dtype)
     if array.size:
-        memory = (ctypes.c_char * array.nbytes).from_address(written.data)
+        memory: Any = (ctypes.c_char * array.nbytes).from_address(written.data)
         array[:] = np.frombuffer(memory, dtype).reshape(shape)
     if written.memory:
         count = ctypes.c_ssize_t.from_address(written.memory)
