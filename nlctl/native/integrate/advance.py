@@ -40,6 +40,8 @@ from .restart import continue_behind_kinks, memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
 from .state import AUTO, DERIVATIVES, ENDED, INNER, METHOD, RUNNING, is_stiff, opposite
 
+_ROUGH = 0.01  # part of a function's value: what ends a step right behind its kink is less
+
 
 @numba.njit(**INNER)
 def _sample(lane, j, task, t_new, w):
@@ -131,9 +133,21 @@ def _accept(task, lanes, w, found, done, passed):
 def _counted(task, lane, w, event, j):
     """Count an accepted step; where a condition stays exactly 0 its steps across stay wide."""
     misses = lane.misses
+    if event and _jumps_at_kink(task, w, j):
+        lane.noisy = 1
     step_accepted(lane, event, event and not _switches(task, w, j))
     if misses > 0 and _from_zero(task, w, True, j):
         lane.misses = misses  # what shorter ones add to a state is lost in rounding
+
+
+@numba.njit(**INNER)
+def _jumps_at_kink(task, w, j):
+    """Whether a function has jumped over its kink at the end of a step, as rounding does."""
+    for i in range(task.rows.bending, task.rows.declared):
+        before, now = w.events.g_start[i, j], w.events.g[i, j]
+        if opposite(before, now) and abs(now) > _ROUGH * abs(before):
+            return True
+    return False
 
 
 @numba.njit(**INNER)

@@ -120,7 +120,7 @@ def begin_afresh(task, lanes, w, sampled):
         lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
         lane.log_error_before = lane.last = lane.low = lane.high = lane.cross = 0.0
         lane.tries = lane.seeks = lane.traces = lane.same_side = 0
-        lane.short = lane.quiet = lane.slow = 0
+        lane.short = lane.quiet = lane.slow = lane.kinks = lane.dull = 0
 
 
 @numba.njit(**INNER)

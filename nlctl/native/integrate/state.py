@@ -86,6 +86,10 @@ _FIELDS = [
     ("same_side", "i8"),  # of these in a row with the event inside
     ("short", "i8"),  # turns of memories in a row right after another
     ("quiet", "i8"),  # steps in which memory events are not looked for
+    ("noisy", "i8"),  # whether the last step has met a kink of a function that is rounding
+    ("kinks", "i8"),  # how many more such steps there have been than others
+    ("dull", "i8"),  # steps in which kinks are not located
+    ("longer", "i8"),  # how often that has been so: each time for longer
     ("slow", "i8"),  # steps in a row whose size stability limits
     ("patience", "i8"),  # such steps that are borne before the stiff method is tried
     ("pace", "f8"),  # how far this method gets with the work of an explicit step (s), see `turns`

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..control import shorten
 from ..state import INNER, is_stiff, opposite
-from .location import AGAIN, CLEAR, EVENT, REFUSED, SMALL_KINK
+from .location import AGAIN, CLEAR, EVENT, REFUSED, SMALL_KINK, is_kink
 
 NOTHING = -2  # no condition lies in the step just tried
 BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
@@ -150,11 +150,11 @@ def _across(task, lane, w, j):
         shorten(lane, 0.5 if lane.stiff else 1.0)  # which is not to ask for this one again
         return REFUSED
     for i in range(task.rows.switching):
-        if has_crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
-            kink = task.rows.bending <= i < task.rows.declared
-            if not (kink and abs(w.events.g[i, j]) <= SMALL_KINK * task.atol):
-                lane.misses = 0
-                return EVENT
+        end = w.events.g[i, j]
+        is_small = is_kink(task, i) and abs(end) <= SMALL_KINK * task.atol
+        if not is_small and (has_crossed(task, w, i, end, j) or left_to_other_side(task, w, i, j)):
+            lane.misses = 0
+            return EVENT
     lane.misses += 1
     return CLEAR
 

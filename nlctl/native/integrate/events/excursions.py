@@ -22,9 +22,10 @@ from ..methods.dense import events_at_parts
 from ..methods.quartic import doubt, least_value, parabola, quartic, slope_at
 from ..restart import AHEAD
 from ..state import INNER, is_stiff
-from .location import AGAIN, STARTS_BEHIND
+from .location import AGAIN, STARTS_BEHIND, is_kink
 
 _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in a step
+_HOPELESS = 0.6  # part of a step in which a smooth function can be followed, after one or two such
 _SHORTER = 0.3  # part of a step to be tried where its event functions cannot be followed
 _FAR = 20.0  # in ranges: what is so far from 0 may grow before it is followed
 _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
@@ -94,6 +95,8 @@ def _known(task, lane, w, i, j, row):
     # Of `f`, which is above 0 at both ends of the step: sign times the function plus offset.
     inside, at = w.inside, task.pair.inside[row]
     values = inside.values
+    if lane.dull and is_kink(task, i):
+        return _CLEAR, 0.0
     sign, offset = _side(w, i, j)
     values[0] = sign * w.events.g_start[i, j] + offset
     values[4] = sign * w.events.g[i, j] + offset
@@ -107,6 +110,8 @@ def _known(task, lane, w, i, j, row):
     longer = (0.1 * extent / max(inside.wrong[j], 1e-300)) ** (1 / 3)
     if task.rows.memory.size and row != _DENSE:
         longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
+    if longer < _HOPELESS and is_kink(task, i):
+        lane.noisy = 1
     inside.resolved[j] = min(inside.resolved[j], longer * lane.step)
     return _judged(task, w, at, extent, 0.0, False, j)
 

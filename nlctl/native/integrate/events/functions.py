@@ -9,7 +9,7 @@ import numpy as np
 
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3
 from ..state import INNER
-from .location import SMALL_KINK
+from .location import SMALL_KINK, is_kink
 
 
 class EventRows(NamedTuple):
@@ -90,8 +90,7 @@ def has_events(w):
 @numba.njit(**INNER)
 def at_zero(task, i, value):
     """Whether a condition is on neither side: exactly 0, at a kink what rounding makes of that."""
-    is_kink = task.rows.bending <= i < task.rows.declared
-    return value == 0.0 or (is_kink and abs(value) <= SMALL_KINK * task.atol)
+    return value == 0.0 or (is_kink(task, i) and abs(value) <= SMALL_KINK * task.atol)
 
 
 @numba.njit(**INNER)

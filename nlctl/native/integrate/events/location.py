@@ -19,14 +19,21 @@ import numpy as np
 from ..control import SMALLEST
 from ..state import INNER, is_stiff, opposite
 
-SMALL_KINK = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
+SMALL_KINK = 0.01  # of the absolute tolerance
 REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
 FAR_SIDE = 0.9  # part of an attempt: the near side has not been looked at close to its end
 CONFIRMED = 3.0  # times as far as a line from the start says that a root lies
 SHORT = 1e-3  # part of a step: a shorter one between events is no progress
 PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
+_NOISE, _LONGEST = 10, 10  # steps with a kink of rounding, then times two of steps without kinks
+
+
+@numba.njit(**INNER)
+def is_kink(task, i):
+    """Whether an event function is one of a condition at which nothing jumps."""
+    return task.rows.bending <= i < task.rows.declared
 
 
 @numba.njit(**INNER)
@@ -57,7 +64,7 @@ def first_root(lane, task, every, w, low, high, j):
     first, rows, small = -1.0, task.rows, SMALL_KINK * task.atol
     start, behind = w.events.g_start, w.events.behind
     for i in range(rows.switching if every else rows.declared):
-        if rows.bending <= i < rows.declared and abs(start[i, j]) + abs(high[i, j]) <= small:
+        if is_kink(task, i) and (lane.dull or abs(start[i, j]) + abs(high[i, j]) <= small):
             continue  # rounding of what is 0: a kink that small is seen by nobody
         if triggered(start[i, j], high[i, j], behind[i, j] != 0.0):
             root = _root(lane, low[i, j], high[i, j])
@@ -231,14 +238,18 @@ def locate_jump(lane, rtol, is_behind):
 
 @numba.njit(**INNER)
 def step_accepted(lane, event, turn):
-    """Count an accepted step; after several turns of memories without progress these rest."""
+    """Count an accepted step; turns without progress rest, after several, and noisy kinks."""
     lane.accepted += 1
     lane.last = lane.step
     lane.tries = lane.seeks = lane.returns = 0
-    lane.quiet = max(0, lane.quiet - 1)
+    lane.quiet, lane.dull = max(0, lane.quiet - 1), max(0, lane.dull - 1)
     if not lane.across and lane.cross == 0.0:
         lane.misses = 0
     lane.events += event
+    lane.kinks, lane.noisy = max(0, lane.kinks + (1 if lane.noisy else -1)), 0
+    if lane.kinks >= _NOISE:  # error control is enough: rates are alike on both sides
+        lane.kinks, lane.dull = 0, REST << min(lane.longer, _LONGEST)
+        lane.longer += 1
     if lane.step >= SHORT * lane.h:
         lane.short = 0
     elif turn and not lane.across:  # what else is located does not come back by rounding

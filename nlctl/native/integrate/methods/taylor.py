@@ -24,7 +24,7 @@ from ...machine.address import (
 from ..control import LEAST_PART, SMALLEST
 from ..evaluate import hold_memories, input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
-from ..events.location import SMALL_KINK, behind_event, triggered
+from ..events.location import SMALL_KINK, behind_event, is_kink, triggered
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
 from .carried import (
@@ -302,7 +302,7 @@ def _meets(task, w, i, end, j):
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
     small = abs(w.events.g_start[i, j]) + abs(end) <= SMALL_KINK * task.atol
-    if task.rows.bending <= i < task.rows.declared and small:
+    if is_kink(task, i) and small:
         return False  # see `first_root`
     return triggered(w.events.g_start[i, j], end, w.events.behind[i, j] != 0.0)
 
