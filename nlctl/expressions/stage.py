@@ -18,7 +18,7 @@ import logging
 import math
 import typing
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -39,6 +39,7 @@ from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, boxed, unwrapped
 from .operators import elementwise
+from .registers import Kept, Register
 from .rewritten import NumberKeys, followable_code, names_for
 from .roots import roots
 from .source import codes_in, is_dispatcher
@@ -55,8 +56,10 @@ _LARGE = 65536  # elements of an array that stays as it is
 class Stage:
     """Everything that a traced function sees instead of the real thing."""
 
-    def __init__(self, graph: Graph, *, merging: bool = False) -> None:
-        self.graph, self.merging = graph, merging
+    def __init__(
+        self, graph: Graph, registers: Sequence[Register] = (), *, merging: bool = False
+    ) -> None:
+        self.graph, self.merging, self.kept = graph, merging, Kept(graph, registers)
         self._copies: dict[int, tuple[Any, Any]] = {}
         self.classes: dict[type, type] = {}
         self._objects: dict[int, tuple[Any, Any]] = {}
@@ -122,6 +125,8 @@ class Stage:
 
     def instead(self, value: Any) -> Any:
         """Return what stands for a value that was there before."""
+        if self.kept.has(value):
+            return self.kept.elements(value)
         if value is np or value is math or value is cmath:
             return self.numpy if value is np else self.math if value is math else self.cmath
         if isinstance(value, ModuleType):

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.registers import Register
 from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
@@ -42,6 +43,7 @@ from .values import (
     forgotten,
     handed_out_again,
     holder,
+    is_itself_alone,
     least_upper_bound,
     library,
     maybe_shared,
@@ -58,6 +60,7 @@ OPERATORS = {
     ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne",
 }  # fmt: skip
 _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
+_SAME = (ast.Eq, ast.NotEq, ast.Is, ast.IsNot)
 _SIGNS = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__", ast.Not: "__bool__"}
 
 
@@ -157,10 +160,25 @@ class Expressions(ast.NodeVisitor):
             return
         if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
-        if not base.own:
+        if not base.own and not self.registered(target, base, value):
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
         self.kept(base, [value])
+
+    def registered(
+        self, target: ast.Subscript | ast.Attribute, base: KnownValue, value: KnownValue
+    ) -> bool:
+        """Note that a field or elements of what was there before are written, if they can be."""
+        is_field = isinstance(target, ast.Attribute)
+        setter = inspect.getattr_static(type(base.known), target.attr, None) if is_field else None
+        if isinstance(setter, property) and setter.fset and library(type(base.known)) is None:
+            self.walk.captured(type(base.known), target.attr, setter)
+            self.walk.call(captured(setter.fset), Given((base, value)))
+            return True
+        title = ast.unparse(target if is_field else target.value)
+        name = target.attr if is_field else ""
+        place = f"{source_file(self.frame.function)}, line {target.lineno}"
+        return self.walk.written(base, value, Register(base.known, name, title, place))
 
     def write_object(
         self, target: ast.Subscript | ast.Attribute, base: KnownValue, value: KnownValue
@@ -245,6 +263,9 @@ class Expressions(ast.NodeVisitor):
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
         values = [self.visit(part) for part in (node.left, *node.comparators)]
         for test, left, right in zip(node.ops, values, values[1:], strict=False):
+            if isinstance(test, _SAME) and all(map(is_itself_alone, (left, right))):
+                self.walk.numba_differs += ["identity"]
+                return FRESH
             self.operated(type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
@@ -489,6 +510,8 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     if library(type(thing)) is not None or isinstance(thing, type | super):
         return True
     member = inspect.getattr_static(thing, name, UNKNOWN_VALUE)
+    if member is getattr(thing, "__dict__", {}).get(name, UNKNOWN_VALUE) is not UNKNOWN_VALUE:
+        return True  # its own is a plain value, whatever it is
     if member is UNKNOWN_VALUE:
         return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
     simple = (FunctionType, staticmethod, classmethod)

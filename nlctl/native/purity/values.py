@@ -306,6 +306,12 @@ def is_somebodys(thing: object) -> bool:
     return not isinstance(thing, plain) and library(type(thing)) is None
 
 
+def is_itself_alone(value: KnownValue) -> bool:
+    """Whether a value is an object that was there before, and equal to itself alone."""
+    known = [v.known for v in value.known.choices] if isinstance(value.known, OneOf) else [value.known]
+    return all(is_somebodys(v) and type(v).__eq__ is object.__eq__ and not callable(v) for v in known)
+
+
 def maybe_shared(value: KnownValue) -> KnownValue:
     """Return what is known of a list that may have been given what the call has not made."""
     known = UNKNOWN_VALUE if value.known is ARRAYS else value.known

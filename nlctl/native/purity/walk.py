@@ -5,11 +5,20 @@ from __future__ import annotations
 import ast
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from dataclasses import replace
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
+from ...expressions.registers import Register
 from .captured import Captured, noted
-from .values import Given, Instance, KnownValue, Message, captured
+from .registers import has_plain_fields, is_workspace, may_be_kept
+from .values import Given, Instance, KnownValue, Message, captured, least_upper_bound
+
+
+Registers = dict[tuple[int, str], tuple[Register, KnownValue]]
+WORKSPACE = KnownValue(True, True)  # a list or an array of numbers
 
 
 class Walk(ABC):
@@ -19,7 +28,10 @@ class Walk(ABC):
     they meet on the way is kept here.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, registers: Registers | None = None) -> None:
+        # what is written into what was there before, and what is known of its values
+        self.registers: Registers = {} if registers is None else registers
+        self.learnt = False  # whether there is more of it than before the walk
         self.read: dict[tuple[int, str], Captured] = {}
         self.numba_differs: list[str] = []  # see `FunctionReading`
         self.messages: list[Message] = []
@@ -31,9 +43,37 @@ class Walk(ABC):
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
+        if (id(holder), name) in self.registers:
+            return self.registers[id(holder), name][1]
+        if (id(value), "") in self.registers:  # which one it is counts, not what is in it
+            self.read[id(holder), name] = Captured(holder, name, value)
+            return self.registers[id(value), ""][1]
         if (id(holder), name) not in self.read:
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
+
+    def written(self, base: KnownValue, value: KnownValue, register: Register) -> bool:
+        """Note that what was there before is written into; return whether it can be."""
+        thing, name = register.holder, register.name
+        fits = has_plain_fields(thing, name) if name else is_workspace(thing) and value.own
+        if base.known is not thing or not fits or not may_be_kept(value):
+            return False
+        before = getattr(thing, name, 0.0) if name else thing
+        if isinstance(before, np.ndarray) and is_workspace(before):  # unknown numbers in a copy
+            self._register(replace(register, holder=before, name=""), WORKSPACE)
+            before = 0.0
+        if name:
+            kept = least_upper_bound([captured(before), value])
+            self._register(register, KnownValue(kept.own, kept.inside, kept.holds))
+        elif isinstance(thing, list):
+            self._register(register, WORKSPACE)
+        return True
+
+    def _register(self, register: Register, value: KnownValue) -> None:
+        one, known = self.registers.get(register.key, (register, value))
+        now = least_upper_bound([known, value])
+        self.learnt |= register.key not in self.registers or now != known
+        self.registers[register.key] = one, now
 
     def new_object(self, cls: type) -> Instance:
         """Return an object that the call has made, of which nothing is known yet."""
