@@ -156,6 +156,7 @@ class Graph:
         self.lengths = dict(lengths or {})
         # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
+        self.branches = 0  # how many branches are around that may not be taken
         self.attempts = 0  # how many ``try`` are around: an error in these is a way of its own
         # expressions that are numbers of Python's own somewhere, which raise errors where NumPy's
         # are infinite
@@ -175,6 +176,11 @@ class Graph:
         self.is_cut = False  # whether Python may do more than is written out, and there is NaN
         self._known: dict[Any, Expr] = {}
         self._results: dict[tuple[Any, ...], Expr] = {}
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is not known if what is followed runs at all."""
+        return bool(self.branches or self.passing)
 
     def decided(self, condition: Expr) -> bool:
         """Return whether a condition holds on this path; ask the tracer if that is open."""

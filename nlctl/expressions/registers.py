@@ -60,8 +60,8 @@ class Kept:
         """Keep what is written into a field."""
         if not self.has(holder, name):
             raise Untraceable("a function that changes an object")
-        if self.graph.passing:
-            raise Untraceable("a function that changes an object in a loop whose end is open")
+        if self.graph.is_open:
+            raise Untraceable("a branch that changes an object")
         key = (id(holder), name)
         self.forms.setdefault(key, set()).add(_form(value))
         self.values[key] = value

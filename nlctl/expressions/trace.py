@@ -75,8 +75,7 @@ def _in_few_ways(
         if left[0] >= 0:
             raise
     try:
-        if not registers:  # what is written in a branch is followed way by way
-            return _traced(graph, function, arguments, (), [PATHS, PATHS], merging=True)
+        return _traced(graph, function, arguments, registers, [PATHS, PATHS], merging=True)
     except Untraceable as error:
         if isinstance(error.__cause__, Staircase):
             raise
@@ -113,6 +112,7 @@ def _traced(
         raise Untraceable(f"{text}{_place(error)}") from error
     finally:
         graph.decisions, graph.implied, graph.guards, graph.attempts = {}, {}, [], 0
+        graph.branches = 0
         graph.limit, graph.merges, graph.answers = UNLIMITED, False, None
 
 

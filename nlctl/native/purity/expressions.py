@@ -49,6 +49,7 @@ from .values import (
     maybe_shared,
     one_among,
     row,
+    was_there,
 )
 from .walk import Walk
 
@@ -171,7 +172,7 @@ class Expressions(ast.NodeVisitor):
         """Note that a field or elements of what was there before are written, if they can be."""
         is_field = isinstance(target, ast.Attribute)
         setter = inspect.getattr_static(type(base.known), target.attr, None) if is_field else None
-        if isinstance(setter, property) and setter.fset and library(type(base.known)) is None:
+        if isinstance(setter, property) and setter.fset and was_there(base.known):
             self.walk.captured(type(base.known), target.attr, setter)
             self.walk.call(captured(setter.fset), Given((base, value)))
             return True

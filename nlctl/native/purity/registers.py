@@ -16,7 +16,7 @@ import numpy as np
 
 from ...expressions.registers import NUMBERS, Register
 from .captured import Captured, held_attributes
-from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, is_somebodys, library
+from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__")
 _DEPTH = 3  # of lists in lists, and of objects of libraries, that are looked through for arrays
@@ -50,7 +50,7 @@ def unfollowed(registers: Sequence[Register], why: str) -> Impure:
 def has_plain_fields(thing: object, name: str) -> bool:
     """Whether writing a field of an object that was there before does nothing else."""
     cls = type(thing)
-    if not is_somebodys(thing) or isinstance(thing, type) or not hasattr(thing, "__dict__"):
+    if not was_there(thing) or isinstance(thing, type) or not hasattr(thing, "__dict__"):
         return False
     foreign = [c for c in cls.__mro__ if c is not object and library(c) is not None]
     ruling = [n for n in _RULING if inspect.getattr_static(cls, n, None) is not (
