@@ -82,7 +82,9 @@ class Kept:
 
     def _left(self, key: tuple[int, str], thing: Any) -> Any:
         if key[1] and isinstance(thing, np.ndarray) and self.has(thing):
-            return self.elements(thing)
+            array = self.elements(thing)
+            self.unknown[key] = self.unknown[id(thing), ""]
+            return array
         form = _form(thing)
         if form is None:
             title = self.registers[key].title

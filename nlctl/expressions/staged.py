@@ -203,6 +203,8 @@ class StagedObject:
 def of_fields(stage: OnStage, function: Any, thing: Any, **changes: object) -> Any:
     """Return what a function of `dataclasses` makes, also of an object that was there before."""
     real = getattr(thing, "__dict__", {}).get("_real")
+    if stage.kept.holds(real):
+        raise Untraceable("fields of an object that is written into")
     fields = dataclasses.fields(thing if real is None else real)
     parts = {f.name: getattr(thing, f.name) for f in fields}
     if real is not None and function is dataclasses.replace:

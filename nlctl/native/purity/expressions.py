@@ -159,6 +159,10 @@ class Expressions(ast.NodeVisitor):
             for thing in objects:
                 self.write_object(target, thing, value)
             return
+        if isinstance(base.known, OneOf) and all(
+            [self.registered(target, thing, value) for thing in objects]
+        ):
+            return
         if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
         if not base.own and not self.registered(target, base, value):
@@ -206,6 +210,7 @@ class Expressions(ast.NodeVisitor):
         """Note that lists of the call, and of objects that it made, hold what it has not made."""
         names = self.frame.names
         names.update({k: maybe_shared(v) for k, v in names.items() if v.holds})
+        self.walk.lists_may_hold_others()
         for thing in self.walk.objects:
             for name, value in list(thing.attributes.items()):
                 if value.holds and value.inside and not isinstance(value.known, Instance):
@@ -394,10 +399,12 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
+                self.walk.check_keeps(thing, name)
                 self.walk.captured(vars(thing), name, getattr(thing, name, None))  # of a first call
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
+            self.walk.check_keeps(thing, name)
             self.walk.captured(type(thing), name, entry)
             return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):

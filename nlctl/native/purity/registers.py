@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,8 @@ def unfollowed(registers: Sequence[Register], why: str) -> Impure:
 def has_plain_fields(thing: object, name: str) -> bool:
     """Whether writing a field of an object that was there before does nothing else."""
     cls = type(thing)
+    if cls is SimpleNamespace:
+        return True
     if not was_there(thing) or isinstance(thing, type) or not hasattr(thing, "__dict__"):
         return False
     foreign = [c for c in cls.__mro__ if c is not object and library(c) is not None]

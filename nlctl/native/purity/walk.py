@@ -13,8 +13,8 @@ import numpy as np
 
 from ...expressions.registers import Register
 from .captured import Captured, noted
-from .registers import has_plain_fields, is_workspace, may_be_kept
-from .values import Given, Instance, KnownValue, Message, captured, least_upper_bound
+from .registers import has_plain_fields, is_workspace, may_be_kept, refused
+from .values import Given, Instance, KnownValue, Message, captured, least_upper_bound, maybe_shared
 
 
 Registers = dict[tuple[int, str], tuple[Register, KnownValue]]
@@ -55,7 +55,7 @@ class Walk(ABC):
     def written(self, base: KnownValue, value: KnownValue, register: Register) -> bool:
         """Note that what was there before is written into; return whether it can be."""
         thing, name = register.holder, register.name
-        fits = has_plain_fields(thing, name) if name else is_workspace(thing) and value.own
+        fits = has_plain_fields(thing, name) if name else is_workspace(thing)
         if base.known is not thing or not fits or not may_be_kept(value):
             return False
         before = getattr(thing, name, 0.0) if name else thing
@@ -66,8 +66,20 @@ class Walk(ABC):
             kept = least_upper_bound([captured(before), value])
             self._register(register, KnownValue(kept.own, kept.inside, kept.holds))
         elif isinstance(thing, list):
-            self._register(register, WORKSPACE)
+            self._register(register, replace(WORKSPACE, holds=True))
         return True
+
+    def lists_may_hold_others(self) -> None:
+        """Note that lists that are registers hold what the call has not made."""
+        for register, value in list(self.registers.values()):
+            if value.holds and value.inside:
+                self._register(register, maybe_shared(value))
+
+    def check_keeps(self, thing: object, name: str) -> None:
+        """Check that what an object keeps of the first call is not of what is written into it."""
+        for register, _ in self.registers.values():
+            if register.holder is thing and register.name:
+                raise refused(register, f"keeps '{name}' of the first call, and then writes into")
 
     def _register(self, register: Register, value: KnownValue) -> None:
         one, known = self.registers.get(register.key, (register, value))
