@@ -10,7 +10,7 @@ import numpy as np
 
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
-from ...expressions.bends import only_bends, replaced_parts
+from ...expressions.bends import Bending, replaced_parts
 from ...expressions.conditions import (
     conditions,
     is_of_places,
@@ -147,13 +147,16 @@ def found_conditions(
     steep = any(map(_is_steep, moving))
     # values of parameters: 1 for those that are not known
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
+    bending = Bending(reader.graph, roots, p) if steep else None
     for condition, node in _undeclared(reader, rates, falls, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = _factors_of_time(reader.graph, condition)
         if condition in timed or condition not in inside:
             count += condition in only_shown
             continue
-        bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
+        bends = condition.op in _BENDS or (
+            bending is not None and bending.only_bends(condition)
+        )
         path, functions = "" if node is None else node.path, _with_sides(reader.graph, condition)
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)
