@@ -143,9 +143,8 @@ def _made_in(nodes: list[ast.AST]) -> set[str]:
     made, others = set(), set()
     known = set[int]()
     for node in nodes:
-        targets = node.targets if isinstance(node, ast.Assign) else []
-        for target in targets:
-            if isinstance(target, ast.Name) and _is_new(node.value):  # type: ignore[attr-defined]
+        for target, value in _pairs(node):
+            if isinstance(target, ast.Name) and _is_new(value):
                 made.add(target.id)
                 known.add(id(target))
         if isinstance(node, ast.AugAssign):
@@ -155,6 +154,16 @@ def _made_in(nodes: list[ast.AST]) -> set[str]:
         if is_bound and id(node) not in known:
             others.add(node.id)
     return made - others
+
+
+def _pairs(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr]]:
+    """Yield what an assignment binds, each with its value; nothing of other statements."""
+    for target in node.targets if isinstance(node, ast.Assign) else ():
+        value = node.value  # type: ignore[attr-defined]
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            yield from zip(target.elts, value.elts, strict=False)
+        else:
+            yield target, value
 
 
 def _is_new(value: ast.expr) -> bool:

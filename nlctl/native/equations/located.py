@@ -154,9 +154,7 @@ def found_conditions(
         if condition in timed or condition not in inside:
             count += condition in only_shown
             continue
-        bends = condition.op in _BENDS or (
-            bending is not None and bending.only_bends(condition)
-        )
+        bends = condition.op in _BENDS or (bending is not None and bending.only_bends(condition))
         path, functions = "" if node is None else node.path, _with_sides(reader.graph, condition)
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)

@@ -74,9 +74,7 @@ def is_workspace(thing: object) -> bool:
     return type(thing) is list and all(type(v) in NUMBERS for v in thing)
 
 
-def check_apart(
-    registers: Sequence[Register], notes: Iterable[Captured], *, is_same: bool
-) -> None:
+def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_same: bool) -> None:
     """Check that nothing of what a function reads from around it is a register under other names.
 
     Within the function that writes them (`is_same`) one list or array is known by its identity.

@@ -55,7 +55,7 @@ class Walk(ABC):
     def written(self, base: KnownValue, value: KnownValue, register: Register) -> bool:
         """Note that what was there before is written into; return whether it can be."""
         thing, name = register.holder, register.name
-        fits = has_plain_fields(thing, name) if name else is_workspace(thing)
+        fits = has_plain_fields(thing, name) if name else self._is_read(thing)
         if base.known is not thing or not fits or not may_be_kept(value):
             return False
         before = getattr(thing, name, 0.0) if name else thing
@@ -68,6 +68,11 @@ class Walk(ABC):
         elif isinstance(thing, list):
             self._register(register, replace(WORKSPACE, holds=True))
         return True
+
+    def _is_read(self, thing: object) -> bool:
+        """Whether a list or an array of numbers was read from around the function, as it is."""
+        is_read = any(note.now is thing for note in self.read.values())
+        return is_read and is_workspace(thing)
 
     def lists_may_hold_others(self) -> None:
         """Note that lists that are registers hold what the call has not made."""
