@@ -121,6 +121,13 @@ class Notices(ast.NodeTransformer):
         return [ast.fix_missing_locations(notice), node]
 
 
+def has_effects(node: ast.FunctionDef) -> bool:
+    """Whether a function may change what it has not made; its tree is changed."""
+    notices = Notices()
+    notices.visit(node)
+    return notices.count > 0
+
+
 def _after_notice(value: ast.expr) -> ast.expr:
     """Return a value behind a notice."""
     pair = ast.Tuple([call_instead("changes"), value], ast.Load())

@@ -177,11 +177,6 @@ class Graph:
         self._known: dict[Any, Expr] = {}
         self._results: dict[tuple[Any, ...], Expr] = {}
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it is not known if what is followed runs at all."""
-        return bool(self.branches or self.passing)
-
     def decided(self, condition: Expr) -> bool:
         """Return whether a condition holds on this path; ask the tracer if that is open."""
         if condition.op == "const":

@@ -368,7 +368,7 @@ def _changes(graph: Graph, what: object = None) -> None:
     is_number = isinstance(what, bool | int | float | np.generic | str) or (
         isinstance(what, Tracer) and not what.shape and not what.is_array
     )
-    if graph.is_open and not is_number:
+    if (graph.branches or graph.passing) and not is_number:
         raise Untraceable("a branch that changes what others see")
 
 

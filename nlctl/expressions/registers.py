@@ -6,7 +6,7 @@ function returns depends on such a leaf, each call computes the same, whatever w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,7 +60,7 @@ class Kept:
         """Keep what is written into a field."""
         if not self.has(holder, name):
             raise Untraceable("a function that changes an object")
-        if self.graph.is_open:
+        if self.graph.branches or self.graph.passing:
             raise Untraceable("a branch that changes an object")
         key = (id(holder), name)
         self.forms.setdefault(key, set()).add(_form(value))
@@ -73,8 +73,10 @@ class Kept:
             self.values[key] = self._left(key, getattr(holder, name, None))
         return self.values[key]
 
-    def elements(self, thing: Any) -> Any:
+    def elements(self, thing: Any, plain: Callable[[Any], Any]) -> Any:
         """Return a list or an array whose elements are written: at first they are unknown."""
+        if not self.has(thing):
+            return plain(thing)
         key = (id(thing), "")
         if key not in self.values:
             self.values[key] = self._left(key, thing)
@@ -82,7 +84,7 @@ class Kept:
 
     def _left(self, key: tuple[int, str], thing: Any) -> Any:
         if key[1] and isinstance(thing, np.ndarray) and self.has(thing):
-            array = self.elements(thing)
+            array = self.elements(thing, np.copy)
             self.unknown[key] = self.unknown[id(thing), ""]
             return array
         form = _form(thing)

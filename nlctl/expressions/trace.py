@@ -31,7 +31,7 @@ from .graph import (
     catchable,
 )
 from .operators import elementwise
-from .registers import Register
+from .registers import Kept, Register
 from .rewritten import Unfollowed, is_raised
 from .stage import Stage
 from .staged import LIBRARIES
@@ -91,7 +91,7 @@ def _traced(
     graph.limit = len(graph.nodes) + budget
     assumptions, graph.merges = dict(graph.assumptions), merging
     try:
-        stage = Stage(graph, registers, merging=merging)
+        stage = Stage(graph, Kept(graph, registers), merging=merging)
 
         def run() -> Tracer:
             stage.kept.begin()

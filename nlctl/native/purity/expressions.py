@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.registers import Register
 from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
-from .parts import names_read, part_at, part_of_one, part_of_row
+from .parts import is_plain_attribute, names_read, part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
     OUTSIDE,
@@ -49,7 +48,6 @@ from .values import (
     maybe_shared,
     one_among,
     row,
-    was_there,
 )
 from .walk import Walk
 
@@ -160,30 +158,15 @@ class Expressions(ast.NodeVisitor):
                 self.write_object(target, thing, value)
             return
         if isinstance(base.known, OneOf) and all(
-            [self.registered(target, thing, value) for thing in objects]
+            self.walk.writes(thing, target, value, self.frame.function) for thing in objects
         ):
             return
         if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
-        if not base.own and not self.registered(target, base, value):
+        if not base.own and not self.walk.writes(base, target, value, self.frame.function):
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
         self.kept(base, [value])
-
-    def registered(
-        self, target: ast.Subscript | ast.Attribute, base: KnownValue, value: KnownValue
-    ) -> bool:
-        """Note that a field or elements of what was there before are written, if they can be."""
-        is_field = isinstance(target, ast.Attribute)
-        setter = inspect.getattr_static(type(base.known), target.attr, None) if is_field else None
-        if isinstance(setter, property) and setter.fset and was_there(base.known):
-            self.walk.captured(type(base.known), target.attr, setter)
-            self.walk.call(captured(setter.fset), Given((base, value)))
-            return True
-        title = ast.unparse(target if is_field else target.value)
-        name = target.attr if is_field else ""
-        place = f"{source_file(self.frame.function)}, line {target.lineno}"
-        return self.walk.written(base, value, Register(base.known, name, title, place))
 
     def write_object(
         self, target: ast.Subscript | ast.Attribute, base: KnownValue, value: KnownValue
@@ -409,7 +392,7 @@ class Expressions(ast.NodeVisitor):
             return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
-        if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
+        if isinstance(thing, ModuleType) or is_plain_attribute(thing, name):
             if isinstance(value := getattr(thing, name, UNKNOWN_VALUE), Unknown):  # it raises
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and (
@@ -511,20 +494,3 @@ class Expressions(ast.NodeVisitor):
         # whatever is in a list is only handed on
         if not isinstance(value.known, ListOf) and not known_calls.iterates(self.walk, value):
             known_calls.check_object(value, "goes through")
-
-
-def _is_plain_attribute(thing: object, name: str) -> bool:
-    """Whether reading an attribute of an object runs no code that could do anything."""
-    if library(type(thing)) is not None or isinstance(thing, type | super):
-        return True
-    member = inspect.getattr_static(thing, name, UNKNOWN_VALUE)
-    if member is getattr(thing, "__dict__", {}).get(name, UNKNOWN_VALUE) is not UNKNOWN_VALUE:
-        return True  # its own is a plain value, whatever it is
-    if member is UNKNOWN_VALUE:
-        return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
-    simple = (FunctionType, staticmethod, classmethod)
-    return (
-        isinstance(member, simple)
-        or not hasattr(type(member), "__get__")
-        or (type(member).__name__ in ("member_descriptor", "_tuplegetter", "getset_descriptor"))
-    )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from types import FunctionType
 from typing import Any
@@ -12,10 +13,19 @@ from typing import Any
 import numpy as np
 
 from ...expressions.registers import Register
+from ...expressions.source import source_file
 from .captured import Captured, noted
 from .registers import has_plain_fields, is_workspace, may_be_kept, refused
-from .values import Given, Instance, KnownValue, Message, captured, least_upper_bound, maybe_shared
-
+from .values import (
+    Given,
+    Instance,
+    KnownValue,
+    Message,
+    captured,
+    least_upper_bound,
+    maybe_shared,
+    was_there,
+)
 
 Registers = dict[tuple[int, str], tuple[Register, KnownValue]]
 WORKSPACE = KnownValue(True, True)  # a list or an array of numbers
@@ -52,11 +62,26 @@ class Walk(ABC):
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
 
-    def written(self, base: KnownValue, value: KnownValue, register: Register) -> bool:
-        """Note that what was there before is written into; return whether it can be."""
+    def writes(
+        self, base: KnownValue, target: ast.Subscript | ast.Attribute, value: KnownValue,
+        function: Callable[..., Any],
+    ) -> bool:  # fmt: skip
+        """Note that a function writes into what was there before; return whether it may."""
+        thing, place = base.known, f"{source_file(function)}, line {target.lineno}"
+        if isinstance(target, ast.Subscript):
+            return self._written(Register(thing, "", ast.unparse(target.value), place), value)
+        setter = inspect.getattr_static(type(thing), target.attr, None)
+        if not isinstance(setter, property) or not setter.fset or not was_there(thing):
+            return self._written(Register(thing, target.attr, ast.unparse(target), place), value)
+        self.captured(type(thing), target.attr, setter)
+        self.call(captured(setter.fset), Given((base, value)))
+        return True
+
+    def _written(self, register: Register, value: KnownValue) -> bool:
+        """Note that a field, or elements, are written; return whether they can be."""
         thing, name = register.holder, register.name
         fits = has_plain_fields(thing, name) if name else self._is_read(thing)
-        if base.known is not thing or not fits or not may_be_kept(value):
+        if not fits or not may_be_kept(value):
             return False
         before = getattr(thing, name, 0.0) if name else thing
         if isinstance(before, np.ndarray) and is_workspace(before):  # unknown numbers in a copy

@@ -68,7 +68,7 @@ def in_statements(x):
     count, y = Count(), 0.0
     if x[1] > 0:
         y = count.bump(x[0])
-    else:
+    elif x[1] > -1:
         y = x[2]
     return count.n + y
 
@@ -87,7 +87,7 @@ def an_array_of_another(x):
 
 def in_a_condition(x):
     array = np.zeros(1)
-    holds = x[0] > 1 and add_to(array, 1.0) > 0 or add_to(array, 2.0) > 10
+    holds = (x[0] > 1 and add_to(array, 1.0) > 0) or add_to(array, 2.0) > 10
     return array[0] + holds
 
 

@@ -99,7 +99,7 @@ def local_functions():
         return [c.command, x[1]]
 
     def of_several_objects(t, x, u, params):
-        for body, v in zip(bodies, x):
+        for body, v in zip(bodies, x, strict=True):
             body.error = v
         return [bodies[1].error - body.error * u[0] for body in bodies]
 
