@@ -90,7 +90,7 @@ class Kept:
         form = _form(thing)
         if form is None:
             title = self.registers[key].title
-            raise Untraceable(f"it reads '{title}', which is no number, before it writes it")
+            raise Untraceable(f"it reads '{title}', which is not a number, before it writes it")
         count = int(np.prod(form[1]))
         start, _ = self.unknown.setdefault(key, (self.leaves, form))
         self.leaves = max(self.leaves, start + count)
@@ -109,11 +109,11 @@ class Kept:
             if places.intersection(range(start, start + int(np.prod(form[1])))):
                 raise Untraceable(f"it remembers '{title}' from one call to the next")
             if self.forms.get(key, {form}) != {form}:
-                raise Untraceable(f"'{title}' is no number, or has another size, in the next call")
+                raise Untraceable(f"it leaves '{title}' in another form than it had")
 
 
 def _form(value: Any) -> tuple[str, tuple[int, ...]] | None:
-    """Return what kind of thing a value is, and its size; None of what is no number."""
+    """Return what kind of thing a value is, and its size; None if it is not of numbers."""
     if isinstance(value, Tracer):
         is_number = not value.shape and not value.is_array
         return ("number", ()) if is_number else ("array", value.shape)
