@@ -47,7 +47,7 @@ class Bending:
         """Return whether roots are the same on both sides; what agrees on the way goes no further.
 
         Where a condition chooses one of two pieces of a table these have the same value there, and
-        whatever is made of them need not be looked at.
+        so has whatever is made of them.
         """
         apart: dict[Expr, list[np.ndarray]] = {}
         waiting = [n.index for n in point.tied]

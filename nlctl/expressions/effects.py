@@ -65,10 +65,10 @@ class Notices(ast.NodeTransformer):
     def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
         """Notice where an array is changed under all its names."""
         name = node.target.id if isinstance(node.target, ast.Name) else ""
-        made, shared, _ = self.scopes[-1]
+        built, shared, _ = self.scopes[-1]
         if not name or name in shared:
             return self._noticed(node, self._changes(node.target))
-        return self._noticed(node, name not in made, ast.Name(name, ast.Load()))
+        return self._noticed(node, name not in built, ast.Name(name, ast.Load()))
 
     def visit_For(self, node: ast.For) -> list[ast.stmt]:
         """Notice where a loop binds something else than variables, or uses up an iterator."""
@@ -100,7 +100,7 @@ class Notices(ast.NodeTransformer):
 
     def _changes(self, target: ast.expr) -> bool:
         """Whether binding a target changes more than variables, and parts of what is made here."""
-        made, shared, first = self.scopes[-1]
+        built, shared, first = self.scopes[-1]
         if isinstance(target, ast.Tuple | ast.List):
             return any(map(self._changes, target.elts))
         if isinstance(target, ast.Starred):
@@ -110,7 +110,7 @@ class Notices(ast.NodeTransformer):
         base = target.value if isinstance(target, ast.Subscript | ast.Attribute) else None
         of_self = isinstance(target, ast.Attribute) and isinstance(base, ast.Name)
         return not (isinstance(base, ast.Name) and (
-            (of_self and base.id == first) or (not of_self and base.id in made)))  # fmt: skip
+            (of_self and base.id == first) or (not of_self and base.id in built)))  # fmt: skip
 
     def _noticed(self, node: ast.stmt, changes: bool, *what: ast.expr) -> list[ast.stmt]:
         self.generic_visit(node)
@@ -147,20 +147,23 @@ def _of_scope(node: ast.FunctionDef) -> Iterator[ast.AST]:
 
 def _made_in(nodes: list[ast.AST]) -> set[str]:
     """Return names that are bound to nothing but what a function makes itself."""
-    made, others = set(), set()
-    known = set[int]()
+    built, others = set(), set()
+    places = set[int]()
     for node in nodes:
         for target, value in _pairs(node):
             if isinstance(target, ast.Name) and _is_new(value):
-                made.add(target.id)
-                known.add(id(target))
+                built.add(target.id)
+                places.add(id(target))
         if isinstance(node, ast.AugAssign):
-            known.add(id(node.target))
+            places.add(id(node.target))
     for node in nodes:
-        is_bound = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-        if is_bound and id(node) not in known:
+        if (
+            isinstance(node, ast.Name)
+            and isinstance(node.ctx, ast.Store)
+            and id(node) not in places
+        ):
             others.add(node.id)
-    return made - others
+    return built - others
 
 
 def _pairs(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr]]:

@@ -364,7 +364,7 @@ def _with(graph: Graph, kind: str, value: object, part: Callable[[], Any]) -> An
 
 
 def _changes(graph: Graph, what: object = None) -> None:
-    """Refuse in a branch that is followed beside another what changes more than that branch."""
+    """Refuse what changes more than a branch where both are followed."""
     is_number = isinstance(what, bool | int | float | np.generic | str) or (
         isinstance(what, Tracer) and not what.shape and not what.is_array
     )

@@ -65,7 +65,7 @@ def _rewritten(tree: Any, code: CodeType, _: str, named: Set[Any], merging: bool
     return code
 
 
-def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
+def _check_as_it_is(tree: Any, kinds: Set[type], merging: bool) -> None:
     """Check that a method that calls super() has nothing to rewrite."""
     where = "a method that calls super()"
     if ast.Try in kinds or (merging and has_effects(_as_statements(copy.deepcopy(tree)))):

@@ -143,11 +143,10 @@ def found_conditions(
     of_time: dict[Expr, tuple[Expr, ...]] = {}
     rows, count, beyond = 0, 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
     only_shown = set(needed(list(shown))) - inside
-    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
-    steep = any(map(_is_steep, moving))
     # values of parameters: 1 for those that are not known
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
-    bending = Bending(reader.graph, roots, p) if steep else None
+    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
+    bending = Bending(reader.graph, roots, p) if any(map(_is_steep, moving)) else None
     for condition, node in _undeclared(reader, rates, falls, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = _factors_of_time(reader.graph, condition)

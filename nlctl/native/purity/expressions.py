@@ -382,13 +382,11 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                self.walk.check_keeps(thing, name)
-                self.walk.captured(vars(thing), name, getattr(thing, name, None))  # of a first call
+                self.walk.captured(*self.walk.first_result(thing, name))
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
-            self.walk.check_keeps(thing, name)
-            self.walk.captured(type(thing), name, entry)
+            self.walk.captured(type(thing), name, self.walk.unwritten(thing, name, entry))
             return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value

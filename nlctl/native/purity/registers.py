@@ -20,7 +20,7 @@ from .captured import Captured, held_attributes
 from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__")
-_DEPTH = 3  # of lists in lists, and of objects of libraries, that are looked through for arrays
+_DEPTH = 3  # of lists in lists, and of objects of libraries, that are searched for arrays
 
 
 REMEMBERS = (

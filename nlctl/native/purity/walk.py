@@ -105,11 +105,16 @@ class Walk(ABC):
             if value.holds and value.inside:
                 self._register(register, maybe_shared(value))
 
-    def check_keeps(self, thing: object, name: str) -> None:
-        """Check that what an object keeps of the first call is not of what is written into it."""
+    def first_result(self, thing: Any, name: str) -> tuple[Any, str, Any]:
+        """Return where an object keeps the result of a first call."""
+        return vars(thing), name, self.unwritten(thing, name, getattr(thing, name, None))
+
+    def unwritten(self, thing: object, name: str, value: Any) -> Any:
+        """Return what an object keeps of a first call, unless it is then written into."""
         for register, _ in self.registers.values():
             if register.holder is thing and register.name:
                 raise refused(register, f"keeps '{name}' of the first call, and then writes into")
+        return value
 
     def _register(self, register: Register, value: KnownValue) -> None:
         one, known = self.registers.get(register.key, (register, value))
