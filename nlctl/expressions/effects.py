@@ -12,15 +12,19 @@ from collections.abc import Iterator
 
 from .merged import call_instead
 
+# methods that change what they are of, functions that change what they are given
 CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
             "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
             "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
-            "rotate", "next", "send", "setattr", "delattr", "copyto", "place", "putmask",
-            "fill_diagonal", "put_along_axis", "insort", "insort_left", "insort_right", "heappush",
-            "heappop", "heapify", "heapreplace", "heappushpop", "setitem", "delitem", "iadd",
-            "isub", "imul", "itruediv", "ifloordiv", "imod", "ipow", "imatmul", "iand", "ior",
-            "ixor", "iconcat", "ilshift", "irshift", "__setitem__", "__setattr__",
-            "__delitem__", "__iadd__"}  # fmt: skip
+            "rotate"}  # fmt: skip
+WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
+           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
+           "heappushpop"}  # fmt: skip
+IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
+            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
+_NOTICED = CHANGING | WRITERS | IN_PLACE | {
+    "next", "send", "setattr", "delattr", "__setitem__", "__setattr__", "__delitem__", "__iadd__"
+}  # fmt: skip
 _MAKERS = {"zeros", "ones", "empty", "eye", "full", "identity", "array", "copy", "zeros_like",
            "ones_like", "empty_like", "full_like", "list", "dict", "set", "deque"}  # fmt: skip
 _DISPLAYS = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp, ast.BinOp,
@@ -92,7 +96,7 @@ class Notices(ast.NodeTransformer):
         name = node.func.attr if by_attribute else getattr(node.func, "id", "")  # type: ignore[attr-defined]
         base = node.func.value if isinstance(node.func, ast.Attribute) else None
         is_made = isinstance(base, ast.Name) and base.id in self.scopes[-1][0]
-        writes = name in CHANGING and not is_made
+        writes = name in _NOTICED and not is_made
         if writes or any(k.arg == "out" for k in node.keywords):
             self.count += 1
             node.func = ast.copy_location(_after_notice(node.func), node.func)

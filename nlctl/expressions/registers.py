@@ -15,8 +15,8 @@ import numpy as np
 from .arrays import Tracer, leaf_vector, scalar
 from .graph import Expr, Graph, Untraceable, needed
 
-NUMBERS = (int, float, np.float64)
-LEFT = "left"  # name of the array that the unknowns are read from, which no program has
+REAL_NUMBERS = (int, float, np.float64)
+LEFT_OVER = "left"  # name of the array that the unknowns are read from, which no program has
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +95,15 @@ class Kept:
         start, _ = self.unknown.setdefault(key, (self.leaves, form))
         self.leaves = max(self.leaves, start + count)
         if form[0] == "number":
-            return scalar(self.graph, self.graph.leaf(LEFT, start, None))
-        array = leaf_vector(self.graph, LEFT, start, form[1])
+            return scalar(self.graph, self.graph.leaf(LEFT_OVER, start, None))
+        array = leaf_vector(self.graph, LEFT_OVER, start, form[1])
         return [array[k] for k in range(count)] if form[0] == "list" else array
 
     def check(self, results: Iterable[Expr]) -> None:
         """Refuse what depends on what another call has left."""
         if not self.unknown:
             return
-        places = {n.data[1] for n in needed(results) if n.op == "leaf" and n.data[0] == LEFT}
+        places = {n.data[1] for n in needed(results) if n.op == "leaf" and n.data[0] == LEFT_OVER}
         for key, (start, form) in self.unknown.items():
             title = self.registers[key].title
             if places.intersection(range(start, start + int(np.prod(form[1])))):
@@ -117,7 +117,7 @@ def _form(value: Any) -> tuple[str, tuple[int, ...]] | None:
     if isinstance(value, Tracer):
         is_number = not value.shape and not value.is_array
         return ("number", ()) if is_number else ("array", value.shape)
-    if type(value) in NUMBERS:
+    if type(value) in REAL_NUMBERS:
         return "number", ()
     if type(value) is np.ndarray and value.dtype == float and value.ndim:
         return "array", value.shape

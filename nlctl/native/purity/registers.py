@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.registers import NUMBERS, Register
+from ...expressions.registers import REAL_NUMBERS, Register
 from .captured import Captured, held_attributes
 from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
 
@@ -29,7 +29,7 @@ REMEMBERS = (
 )
 
 
-def refused(register: Register, what: str) -> Impure:
+def refused_register(register: Register, what: str) -> Impure:
     """Return why a function is not one of its arguments alone."""
     error = Impure(f"{what} '{register.title}'", REMEMBERS)
     error.place = register.place
@@ -40,10 +40,10 @@ def unfollowed(registers: Sequence[Register], why: str) -> Impure:
     """Return why a function that writes into what was there before is not written out."""
     named = [r for r in registers if f"'{r.title}'" in why]
     if not named or not why.startswith("it "):
-        error = refused(registers[0], "writes into")
+        error = refused_register(registers[0], "writes into")
         error.advice = f"write to variables of its own, or as expressions what is none: {why}"
         return error
-    error = refused(named[0], "")
+    error = refused_register(named[0], "")
     error.reason = why.removeprefix("it ")
     return error
 
@@ -71,7 +71,7 @@ def is_workspace(thing: object) -> bool:
     """Whether the elements of a list or an array are numbers that nobody else has a view of."""
     if type(thing) is np.ndarray:
         return thing.dtype == float and thing.base is None and thing.ndim > 0
-    return type(thing) is list and all(type(v) in NUMBERS for v in thing)
+    return type(thing) is list and all(type(v) in REAL_NUMBERS for v in thing)
 
 
 def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_same: bool) -> None:
@@ -83,11 +83,11 @@ def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_
     spaces = [r for r in registers if not r.name]
     for note in notes if registers else ():
         if (register := by_key.get((id(note.holder), note.name))) is not None:
-            raise refused(register, "shares with another function what it writes into")
+            raise refused_register(register, "shares with another function what it writes into")
         whole = note.now
         for register in spaces:
             if any(_are_one(register.holder, v, is_same and v is whole) for v in _parts(whole)):
-                raise refused(register, "knows under another name what it writes into")
+                raise refused_register(register, "knows under another name what it writes into")
 
 
 def _are_one(space: Any, value: Any, is_known: bool) -> bool:

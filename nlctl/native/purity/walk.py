@@ -15,7 +15,7 @@ import numpy as np
 from ...expressions.registers import Register
 from ...expressions.source import source_file
 from .captured import Captured, noted
-from .registers import has_plain_fields, is_workspace, may_be_kept, refused
+from .registers import has_plain_fields, is_workspace, may_be_kept, refused_register
 from .values import (
     Given,
     Instance,
@@ -113,7 +113,9 @@ class Walk(ABC):
         """Return what an object keeps of a first call, unless it is then written into."""
         for register, _ in self.registers.values():
             if register.holder is thing and register.name:
-                raise refused(register, f"keeps '{name}' of the first call, and then writes into")
+                raise refused_register(
+                    register, f"keeps '{name}' of the first call, and then writes into"
+                )
         return value
 
     def _register(self, register: Register, value: KnownValue) -> None:
