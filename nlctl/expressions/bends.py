@@ -2,44 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import heapq
+from collections.abc import Iterable, Mapping, Sequence
+from operator import attrgetter
 
 import numpy as np
 
-from .evaluate import evaluate_expressions, value_of
-from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
+from .evaluate import value_of
+from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, deduce, needed, parts_first
 
 _SIDES = {"sign": (1.0, -1.0), "heaviside": (1.0, 0.0)}  # values above 0 and below
 _POINTS = 256
 _NEAR = 0.1  # of a parameter
 _SAME = 1e-12
+_ROUNDED = 1e-14  # relative difference of what is equal but for rounding
 
 
-def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarray) -> bool:
-    """Return whether nothing that expressions are made of jumps at a condition, with such p."""
-    if condition.op not in (*ORDERS, *_SIDES, "copysign") or condition.size is not None:
-        return False
-    one, other = _compared(graph, condition)
-    moved, place = (one, other) if one.varies else (other, one)
-    nodes = needed(roots)
-    tied = [n for n in nodes if _is_tied(graph, n, (one, other))]
-    asking = _made_of(nodes, set(tied))
-    try:
-        arrays = _at_random((*nodes, *needed([place])), p)
-        there = {moved: evaluate_expressions([place], arrays)[0]}
-        there |= _free(nodes, tied, there, (moved, place), arrays)
-        jumping = [root for root in dict.fromkeys(roots) if root in asking]
-        sides = [
-            _values(jumping, arrays, there, _on_side(graph, tied, one, above))
-            for above in (True, False)
-        ]
-    except Untraceable:
-        return False
-    with np.errstate(invalid="ignore"):  # what is infinite on both sides is not known to agree
-        return all(
-            np.all(abs(np.subtract(a, b, dtype=float)) <= _SAME * (1 + abs(a) + abs(b)))
-            for a, b in zip(*sides, strict=True)  # truth values as well, of guards
-        )
+class Bending:
+    """Which conditions only bend what some expressions are made of, with such parameters."""
+
+    def __init__(self, graph: Graph, roots: Sequence[Expr], p: np.ndarray) -> None:
+        self.graph, self.roots = graph, roots
+        self.nodes = needed(roots)
+        self.readers: dict[Expr, list[Expr]] = {}
+        for node in self.nodes:
+            for arg in dict.fromkeys(node.args):
+                self.readers.setdefault(arg, []).append(node)
+        self.arrays = _at_random(graph.nodes, p)
+
+    def only_bends(self, condition: Expr) -> bool:
+        """Return whether nothing that the expressions are made of jumps at a condition."""
+        if condition.op not in (*ORDERS, *_SIDES, "copysign") or condition.size is not None:
+            return False
+        one, other = _compared(self.graph, condition)
+        tied = [n for n in self.nodes if _is_tied(self.graph, n, (one, other))]
+        sides = [_on_side(self.graph, tied, one, above) for above in (True, False)]
+        pair = (one, other) if one.varies else (other, one)
+        try:
+            return self._agree(_Point(self.arrays, tied, pair), sides)
+        except Untraceable:
+            return False
+
+    def _agree(self, point: _Point, sides: Sequence[Mapping[Expr, bool | float]]) -> bool:
+        """Return whether roots are the same on both sides; what agrees on the way goes no further.
+
+        Where a condition chooses one of two pieces of a table these have the same value there, and
+        so has whatever is made of them.
+        """
+        apart: dict[Expr, list[np.ndarray]] = {}
+        waiting = [n.index for n in point.tied]
+        heapq.heapify(waiting)
+        done: set[Expr] = {point.moved}
+        while waiting:
+            node = self.graph.nodes[heapq.heappop(waiting)]
+            if node in done or point.is_free(node):
+                continue
+            done.add(node)
+            a, b = (point.on_side(node, apart, side, k) for k, side in enumerate(sides))
+            with np.errstate(invalid="ignore"):  # infinite on both sides is not known to agree
+                alike = np.all(abs(_less(a, b)) <= _ROUNDED * (abs(a) + abs(b)))
+            if alike and node not in point.tied:
+                point.values[node] = a
+                continue
+            apart[node] = [a, b]
+            for reader in self.readers.get(node, ()):
+                heapq.heappush(waiting, reader.index)
+        with np.errstate(invalid="ignore"):
+            return all(
+                np.all(abs(_less(a, b)) <= _SAME * (1 + abs(a) + abs(b)))
+                for a, b in (apart[root] for root in dict.fromkeys(self.roots) if root in apart)
+            )
 
 
 def _compared(graph: Graph, condition: Expr) -> tuple[Expr, Expr]:
@@ -70,77 +102,88 @@ def _on_side(
     return values
 
 
-_Arrays = Mapping[str, np.ndarray]
+def _less(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.subtract(a, b, dtype=float)  # of truth values as well, of guards
 
 
-def _values(
-    exprs: Sequence[Expr],
-    arrays: _Arrays,
-    instead: Mapping[Expr, np.ndarray],
-    sides: Mapping[Expr, bool | float],
-) -> list[np.ndarray]:
-    """Return the values of expressions, with other values or signs for some of their parts."""
-    values = dict(instead)
-    with np.errstate(all="ignore"):
-        for node in needed(exprs, instead.keys() | {n for n in sides if n.op != "copysign"}):
+class _Point:
+    """Values at random where a condition switches, as far as they are asked for."""
+
+    # What is met only rarely would not be met by values at random: so other conditions are true or
+    # false, whatever they ask for. Only those that parameters alone decide, where this condition
+    # switches, are what they are; unless they switch there, too.
+
+    def __init__(
+        self, arrays: Mapping[str, np.ndarray], tied: Sequence[Expr], pair: tuple[Expr, Expr]
+    ) -> None:
+        self.moved, place = pair
+        self.arrays, self.tied = arrays, set(tied)
+        self.values: dict[Expr, np.ndarray] = {}
+        self.moving: dict[Expr, bool] = {}
+        self.free: dict[Expr, bool] = {}
+        (at_place,) = self.of([place])
+        moves = self._moves(place)
+        self.values, self.moving, self.free = {self.moved: at_place}, {self.moved: moves}, {}
+
+    def of(self, exprs: Sequence[Expr]) -> list[np.ndarray]:
+        """Return the values of expressions."""
+        with np.errstate(all="ignore"):
+            for node in parts_first(exprs, self._parts):
+                if node not in self.values:
+                    self.values[node] = self._value(node)
+        return [self.values[expr] for expr in exprs]
+
+    def on_side(
+        self, node: Expr, apart: Mapping[Expr, Sequence[np.ndarray]],
+        sides: Mapping[Expr, bool | float], k: int,
+    ) -> np.ndarray:  # fmt: skip
+        """Return the value of an expression on one side, of parts some of which differ there."""
+        if node in sides and node.op != "copysign":
+            return np.asarray(sides[node])
+        self.of([arg for arg in node.args if arg not in apart])
+        parts = [apart[a][k] if a in apart else self.values[a] for a in node.args]
+        with np.errstate(all="ignore"):
             if node in sides:
-                side = np.asarray(sides[node])
-                values[node] = abs(values[node.args[0]]) * side if node.op == "copysign" else side
-            elif node not in values:
-                values[node] = value_of(node, [values[arg] for arg in node.args], arrays)
-    return [values[expr] for expr in exprs]
+                return abs(parts[0]) * np.asarray(sides[node])
+            return value_of(node, parts, self.arrays)
+
+    def _parts(self, node: Expr) -> tuple[Expr, ...]:
+        return () if node in self.values or self.is_free(node) else node.args
+
+    def _value(self, node: Expr) -> np.ndarray:
+        if self.is_free(node):
+            rng = np.random.default_rng((2, node.index))
+            return rng.random((node.size, _POINTS) if node.size else _POINTS) < 0.5
+        return value_of(node, [self.values[arg] for arg in node.args], self.arrays)
+
+    def is_free(self, node: Expr) -> bool:
+        if node.op not in COMPARISONS or node in self.tied:
+            return False
+        if node not in self.free:
+            self.free[node] = self._moves(node) or (node.op in ORDERS and self._is_met(node))
+        return self.free[node]
+
+    def _is_met(self, node: Expr) -> bool:
+        """Whether a comparison that parameters decide switches here, too."""
+        a, b = self.of(node.args)
+        with np.errstate(invalid="ignore"):
+            return bool(np.all(abs(_less(a, b)) <= _SAME * (abs(a) + abs(b))))
+
+    def _moves(self, node: Expr) -> bool:
+        """Whether an expression depends on more than parameters."""
+        moving = self.moving
+
+        def of_parts(part: Expr) -> bool:
+            is_read = part.op == "leaf" and part.data[0] != "p"
+            return is_read or part.op in ("call", "solve") or any(moving[a] for a in part.args)
+
+        return deduce(moving, node, attrgetter("args"), of_parts)
 
 
-def _free(
-    nodes: Sequence[Expr],
-    tied: Sequence[Expr],
-    there: Mapping[Expr, np.ndarray],
-    pair: tuple[Expr, Expr],
-    arrays: dict[str, np.ndarray],
-) -> dict[Expr, np.ndarray]:
-    """Return what stands for the other conditions: true or false, whatever they ask for."""
-    # What is met only rarely would not be met by values at random. Only those that parameters alone
-    # decide, where this condition switches, are what they are; unless they switch there, too.
-    moved, place = pair
-    moving = _moving(nodes, moved, _moving(needed([place]))[place])
-    others = [n for n in nodes if n.op in COMPARISONS and n not in tied]
-    ordered = [n for n in others if not moving[n] and n.op in ORDERS]
-    numbers = [arg for comparison in ordered for arg in comparison.args]
-    values = _values(numbers, arrays, there, {})
-    with np.errstate(invalid="ignore"):
-        met = {
-            n for n, a, b in zip(ordered, values[::2], values[1::2], strict=True)
-            if np.all(abs(a - b) <= _SAME * (abs(a) + abs(b)))
-        }  # fmt: skip
-    rng = np.random.default_rng(2)
-    free = [n for n in others if moving[n] or n in met]
-    return {n: rng.random((n.size, _POINTS) if n.size else _POINTS) < 0.5 for n in free}
-
-
-def _made_of(nodes: Sequence[Expr], parts: set[Expr]) -> set[Expr]:
-    """Return which expressions, parts first, are among some or made of these."""
-    for node in nodes:
-        if not parts.isdisjoint(node.args):
-            parts.add(node)
-    return parts
-
-
-def _moving(
-    nodes: Sequence[Expr], moved: Expr | None = None, moves: bool = False
-) -> dict[Expr, bool]:
-    """Return which expressions depend on more than parameters; of one it is known."""
-    moving: dict[Expr, bool] = {}
-    for node in nodes:
-        is_read = node.op == "leaf" and node.data[0] != "p"
-        is_moving = is_read or node.op in ("call", "solve") or any(moving[a] for a in node.args)
-        moving[node] = moves if node is moved else is_moving
-    return moving
-
-
-def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
+def _at_random(nodes: Iterable[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
     """Return values for all that expressions read."""
     rng, rows = np.random.default_rng(1), dict.fromkeys(("t", "x", "u"), 1)
-    for node in needed(exprs):
+    for node in nodes:
         if node.op == "leaf" and node.data[0] in rows:
             array, start, step = node.data
             rows[array] = max(rows[array], start + step * ((node.size or 1) - 1) + 1)

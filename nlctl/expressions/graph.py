@@ -156,6 +156,7 @@ class Graph:
         self.lengths = dict(lengths or {})
         # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
+        self.branches = 0  # how many branches are around that may not be taken
         self.attempts = 0  # how many ``try`` are around: an error in these is a way of its own
         # expressions that are numbers of Python's own somewhere, which raise errors where NumPy's
         # are infinite

@@ -301,7 +301,8 @@ def call_instead(name: str, *given: ast.expr) -> ast.Call:
 def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that `Merger` writes."""
     functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite,
-                 "fails": _fails, "number": _number}  # fmt: skip
+                 "fails": _fails, "number": _number, "changes": _changes,
+                 "uses_up": _uses_up}  # fmt: skip
     return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
@@ -362,6 +363,22 @@ def _with(graph: Graph, kind: str, value: object, part: Callable[[], Any]) -> An
     return either[0] if either else value or part()
 
 
+def _changes(graph: Graph, what: object = None) -> None:
+    """Refuse what changes more than a branch where both are followed."""
+    is_number = isinstance(what, bool | int | float | np.generic | str) or (
+        isinstance(what, Tracer) and not what.shape and not what.is_array
+    )
+    if (graph.branches or graph.passing) and not is_number:
+        raise Untraceable("a branch that changes what others see")
+
+
+def _uses_up(graph: Graph, values: Any) -> Any:
+    """Return what a loop goes through, unless it is used up in a branch."""
+    if hasattr(values, "__next__"):
+        _changes(graph)
+    return values
+
+
 def _opposite(graph: Graph, value: object) -> Any:
     """Return ``not value``."""
     condition = _open(graph, value)
@@ -390,7 +407,11 @@ def _open(graph: Graph, test: object) -> Expr | None:
 def _under(graph: Graph, condition: Expr, holds: bool, branch: Callable[[], Any]) -> Any:
     """Return what a branch computes; errors that it may raise matter only where it is taken."""
     before = len(graph.guards)
-    values = branch()
+    graph.branches += 1
+    try:
+        values = branch()
+    finally:
+        graph.branches -= 1
     for k in range(before, len(graph.guards)):
         elsewhere = graph.op("not", condition) if holds else condition
         graph.guards[k] = graph.op("or", elsewhere, graph.guards[k])

@@ -19,6 +19,7 @@ from types import CodeType, FunctionType
 from typing import Any
 
 from .arrays import Tracer, traced
+from .effects import Notices, has_effects
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
 from .indexing import item_at
 from .iterated import NOT_RETURNED, Loop, PassWriter
@@ -54,22 +55,21 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
 
 @functools.lru_cache(maxsize=2048)  # equal code may stand in several files
 def _rewritten(tree: Any, code: CodeType, _: str, named: Set[Any], merging: bool) -> CodeType:
-    words = (*_WORDS, ast.If, ast.IfExp) if merging else _WORDS
-    kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
+    kinds = {type(node) for node in ast.walk(tree)}.intersection(_WORDS)
     if "__class__" in code.co_freevars:  # only within a class is it what it is
         _check_as_it_is(tree, kinds, merging)
-    elif kinds:
+    elif kinds or merging:
         body = _Rewriter(dict(named)).visit(_as_statements(copy.deepcopy(tree)))
-        body = Merger().visit(PassWriter().visit(body)) if merging else body
+        body = Notices().visit(Merger().visit(PassWriter().visit(body))) if merging else body
         return _compiled(body, code)
     return code
 
 
-def _check_as_it_is(tree: ast.AST, kinds: Set[type], merging: bool) -> None:
+def _check_as_it_is(tree: Any, kinds: Set[type], merging: bool) -> None:
     """Check that a method that calls super() has nothing to rewrite."""
     where = "a method that calls super()"
-    if ast.Try in kinds:
-        raise Untraceable(f"try in {where}")
+    if ast.Try in kinds or (merging and has_effects(_as_statements(copy.deepcopy(tree)))):
+        raise Untraceable(f"try, or what changes something, in {where}")
     compared = [n for n in ast.walk(tree) if isinstance(n, ast.Compare)]
     asked = [n for n in compared if {*map(type, n.ops)} & {ast.Is, ast.IsNot}]
     others = [part.value if isinstance(part, ast.Constant) else ...

@@ -39,6 +39,7 @@ from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, boxed, unwrapped
 from .operators import elementwise
+from .registers import Kept
 from .rewritten import NumberKeys, followable_code, names_for
 from .roots import roots
 from .source import codes_in, is_dispatcher
@@ -55,8 +56,8 @@ _LARGE = 65536  # elements of an array that stays as it is
 class Stage:
     """Everything that a traced function sees instead of the real thing."""
 
-    def __init__(self, graph: Graph, *, merging: bool = False) -> None:
-        self.graph, self.merging = graph, merging
+    def __init__(self, graph: Graph, kept: Kept | None = None, *, merging: bool = False) -> None:
+        self.graph, self.merging, self.kept = graph, merging, kept or Kept(graph)
         self._copies: dict[int, tuple[Any, Any]] = {}
         self.classes: dict[type, type] = {}
         self._objects: dict[int, tuple[Any, Any]] = {}
@@ -130,7 +131,7 @@ class Stage:
                 value, self._library if inside else lambda _, v: self.instead(v)
             )
         if type(value) is np.ndarray:
-            return self.fresh(value)
+            return self.kept.elements(value, self.fresh)
         if type(value) is np.matrix:
             return WRITTEN[np.matrix](self.graph, value)
         if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
@@ -142,7 +143,7 @@ class Stage:
         if isinstance(value, type):
             return self._type(value)
         if type(value) in (list, tuple):
-            return type(value)(map(self.instead, value))
+            return self.kept.elements(value, lambda v: type(v)(map(self.instead, v)))
         if type(value) in staged.DICTS:
             parts = {k: self.instead(v) for k, v in value.items()}
             return NumberKeys(parts) if all(isinstance(k, int | float) for k in parts) else parts

@@ -29,6 +29,7 @@ from .library.table import (
     written_out,
 )
 from .operators import elementwise
+from .registers import Kept
 
 DICTS = (dict, OrderedDict, MappingProxyType)  # whose items are replaced like themselves
 LIBRARIES = ("numpy", "scipy", "numba", "pandas", "json", "re")
@@ -42,6 +43,7 @@ class OnStage(Protocol):
 
     graph: Graph
     classes: dict[type, type]
+    kept: Kept
 
     def copied(self, function: object) -> Any:
         """Return a copy of a function whose global names and closure lead to the stage."""
@@ -151,6 +153,8 @@ class StagedObject:
 
     def __getattr__(self, name: str) -> Any:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
+        if stage.kept.has(real, name):
+            return stage.kept.read(real, name)
         attribute = inspect.getattr_static(type(real), name, None)
         if name in getattr(real, "__dict__", {}) and not isinstance(attribute, property):
             return stage.instead(getattr(real, name))  # its own is what Python finds first
@@ -180,7 +184,15 @@ class StagedObject:
         return stage.instead(getattr(real, name))
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise Untraceable("a function that changes an object")
+        real, stage = self.__dict__["_real"], self.__dict__["_stage"]
+        attribute = inspect.getattr_static(type(real), name, None)
+        if isinstance(attribute, property) and not is_of_a_library(real):
+            stage.copied(attribute.fset)(self, value)
+        else:
+            stage.kept.write(real, name, value)
+
+    def __delattr__(self, name: str) -> None:
+        raise Untraceable("a function that deletes a field of an object")
 
     def __call__(self, *arguments: object, **options: object) -> Any:
         if is_law(self._real) and holds_tracers([*arguments, *options.values()]):
@@ -191,6 +203,8 @@ class StagedObject:
 def of_fields(stage: OnStage, function: Any, thing: Any, **changes: object) -> Any:
     """Return what a function of `dataclasses` makes, also of an object that was there before."""
     real = getattr(thing, "__dict__", {}).get("_real")
+    if stage.kept.holds(real):
+        raise Untraceable("fields of an object that is written into")
     fields = dataclasses.fields(thing if real is None else real)
     parts = {f.name: getattr(thing, f.name) for f in fields}
     if real is not None and function is dataclasses.replace:
@@ -223,6 +237,8 @@ def _forwarded(name: str) -> Callable[..., Any]:
         attribute = inspect.getattr_static(type(real), name, None)
         if isinstance(attribute, FunctionType) and not is_of_a_library(real):
             return stage.copied(attribute)(self, *rest)
+        if name in ("__eq__", "__ne__") and attribute is inspect.getattr_static(object, name):
+            return (self is rest[0]) == (name == "__eq__")
         if name in ("__eq__", "__ne__"):
             raise Untraceable(f"comparison of an object of {type(real).__name__}")
         if name == "__iter__" and hasattr(real, "__iter__"):

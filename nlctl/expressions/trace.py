@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import math
 import random
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from .graph import (
     catchable,
 )
 from .operators import elementwise
+from .registers import Kept, Register
 from .rewritten import Unfollowed, is_raised
 from .stage import Stage
 from .staged import LIBRARIES
@@ -42,57 +43,65 @@ _UNLIKELY = 1e-3  # probability below which something is taken not to be so
 _FEW, _DEEP = 6, 8  # paths, and decisions on one, up to which no branch becomes a choice
 
 
-def trace(graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
+def trace(
+    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]],
+    registers: Sequence[Register] = (),
+) -> Tracer:  # fmt: skip
     """Run a function on tracers and return its result in one dimension."""
     try:
-        return _in_few_ways(graph, function, arguments)
+        return _in_few_ways(graph, function, arguments, registers)
     except Untraceable as error:
         if not isinstance(error.__cause__, MessageWritten):
             raise
     graph.settles = True  # ``if params["verbose"]``: traced again where that is another value
     try:
-        return _in_few_ways(graph, function, arguments)
+        return _in_few_ways(graph, function, arguments, registers)
     finally:
         graph.settles = False
 
 
 def _in_few_ways(
-    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]]
-) -> Tracer:
+    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]],
+    registers: Sequence[Register],
+) -> Tracer:  # fmt: skip
     """Follow every way, or choices of numbers where there are too many."""
     # A condition that depends on tracers is followed both ways: the function runs again for every
     # way through it, and the results are combined by ``select``, which takes the branch that Python
     # takes, also for NaN.
     left = [_FEW, _DEEP]
     try:
-        return _traced(graph, function, arguments, left)
+        return _traced(graph, function, arguments, registers, left)
     except Untraceable:
         if left[0] >= 0:
             raise
     try:
-        return _traced(graph, function, arguments, [PATHS, PATHS], merging=True)
+        return _traced(graph, function, arguments, registers, [PATHS, PATHS], merging=True)
     except Untraceable as error:
         if isinstance(error.__cause__, Staircase):
             raise
-    return _traced(graph, function, arguments, [PATHS, PATHS])
+    return _traced(graph, function, arguments, registers, [PATHS, PATHS])
 
 
 def _traced(
-    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]], left: list[int],
-    *, merging: bool = False,
+    graph: Graph, function: object, arguments: Callable[[], tuple[Any, ...]],
+    registers: Sequence[Register], left: list[int], *, merging: bool = False,
 ) -> Tracer:  # fmt: skip
     """Follow every way; with `merging`, branches that only compute numbers are one."""
     budget = _STRAIGHT if left[0] == _FEW else BUDGET * (1 + merging)  # passes of loops are alike
     graph.limit = len(graph.nodes) + budget
     assumptions, graph.merges = dict(graph.assumptions), merging
     try:
-        stage = Stage(graph, merging=merging)
-        copy = stage.copied(function)
-        run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
-        result = _followed(graph, lambda: _flat(graph, run()), {}, left)
+        stage = Stage(graph, Kept(graph, registers), merging=merging)
+
+        def run() -> Tracer:
+            stage.kept.begin()
+            return _flat(graph, stage.copied(function)(*map(stage.instead, arguments())))
+
+        result = _followed(graph, run, {}, left)
         if result is None:
             raise Untraceable("it raises an error on every path")
         graph.limit = UNLIMITED
+        stage.kept.check(_numbers([result]))
         check_slopes(graph, _numbers([result]), _numbers(arguments()))
         return result
     except Ambiguous:
@@ -103,6 +112,7 @@ def _traced(
         raise Untraceable(f"{text}{_place(error)}") from error
     finally:
         graph.decisions, graph.implied, graph.guards, graph.attempts = {}, {}, [], 0
+        graph.branches = 0
         graph.limit, graph.merges, graph.answers = UNLIMITED, False, None
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..blocks import supplied_of
 from ..errors import CompileError
 from ..expressions.arrays import Tracer
-from ..expressions.bends import only_bends, replaced_parts
+from ..expressions.bends import Bending, replaced_parts
 from ..expressions.conditions import conditions, switching_function
 from ..expressions.continuity import may_jump
 from ..expressions.dependence import reads, rows_read
@@ -156,10 +156,8 @@ class EquationParts:
         # a comparison of what jumps there may turn out the other way by that
         compared = [a for e in jumping(roots) for a in e.args if a.varies]
         roots = [*roots, *compared]
-        return [
-            e for e in jumping(roots)
-            if e in cornered or not only_bends(self.graph, roots, e, self.p)
-        ]  # fmt: skip
+        bending = Bending(self.graph, roots, self.p)
+        return [e for e in jumping(roots) if e in cornered or not bending.only_bends(e)]
 
     @property
     def _flowing(self) -> list[Expr]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import control as ct
@@ -18,6 +18,7 @@ from ...upstream.control_internals import current_parameters, outputs_now, rates
 from ...upstream.systems import System
 from ...wording import counted
 from ..purity.check import FunctionReading, check_pure
+from ..purity.registers import check_apart
 from ..purity.values import FRESH, VECTOR, Impure, captured
 from .parameters import current_values
 
@@ -40,17 +41,33 @@ def check_functions(path: str, system: System) -> FunctionReading:
         values = current_parameters(system) if is_block else current_values(system)
         check_arguments(f"block '{path}'", what, function, ("t", "x", "u", "params"))
         try:
-            readings.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
+            reading = check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)])
+            readings.append(reading)
+            for other in readings[:-1]:
+                check_apart(reading.registers, other.captured, is_same=False)
+                check_apart(other.registers, reading.captured, is_same=False)
         except Impure as error:
             raise refused_block(path, what, error) from None
     messages = [message for reading in readings for message in reading.messages]
-    if not messages and not is_block and isinstance(system, ct.NonlinearIOSystem):
+    registers = {r.key: r for reading in readings for r in reading.registers}
+    if not messages and not registers and not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
     return FunctionReading(
         captured=tuple(note for reading in readings for note in reading.captured),
         numba_differs=tuple(name for reading in readings for name in reading.numba_differs),
         messages=tuple(messages),
+        registers=tuple(registers.values()),
     )
+
+
+def check_registers(readings: Mapping[str, FunctionReading]) -> None:
+    """Check that no block reads what the functions of another one write into."""
+    for path, one in readings.items():
+        others = [r for p, r in readings.items() if p != path]
+        try:
+            check_apart(one.registers, (n for r in others for n in r.captured), is_same=False)
+        except Impure as error:
+            raise refused_block(path, "update or output", error) from None
 
 
 def refused_block(path: str, what: str, error: Impure) -> CompileError:

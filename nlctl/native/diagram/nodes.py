@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.registers import Register
 from ...sampling.system import Sampled
 from ..purity.values import Message
 from .wiring import Combination
@@ -48,6 +49,7 @@ class Node:
     # why numba would compute its functions differently: they are traced, or called in Python
     numba_differs: tuple[str, ...] = ()
     messages: tuple[Message, ...] = ()  # that its functions write: they are traced or refused
+    registers: tuple[Register, ...] = ()  # that its functions write: they are traced or refused
     called: frozenset[str] = frozenset()  # kinds of its functions that are not to be traced
     slide: Slide | None = None  # of the ideal relay that stands for a condition: what for
     # what samples the block, whose states are the first ones of this

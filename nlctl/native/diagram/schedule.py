@@ -26,7 +26,7 @@ from ...sampling.system import Happening
 from ...sliding.relay import SLIDING
 from ...upstream.systems import System
 from ..purity.captured import Captured, noted
-from .checks import check_functions
+from .checks import check_functions, check_registers
 from .nodes import Node
 from .trace import closer_feedthrough, feedthrough
 from .wiring import Combination, Signal, Wiring
@@ -94,6 +94,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     readings = [  # before any is called
         check_functions(place.path, one) for place, one in zip(wiring.blocks, blocks, strict=True)
     ]
+    check_registers({p.path: r for p, r in zip(wiring.blocks, readings, strict=True)})
     read += [note for reading in readings for note in reading.captured]
     nodes = tuple(
         Node(
@@ -104,6 +105,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
             direct=feedthrough(one) & (one is place.system),
             numba_differs=reading.numba_differs,
             messages=reading.messages,
+            registers=reading.registers,
             sampled=None if one is place.system else place.system,
         )
         for place, one, reading in zip(wiring.blocks, blocks, readings, strict=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
-from ...expressions.bends import only_bends, replaced_parts
+from ...expressions.bends import Bending, replaced_parts
 from ...expressions.conditions import (
     conditions,
     is_of_places,
@@ -138,17 +138,17 @@ def found_conditions(
     of_time: dict[Expr, tuple[Expr, ...]] = {}
     rows, count, beyond = 0, 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
     only_shown = set(needed(list(shown))) - inside
-    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
-    steep = any(map(_is_steep, moving))
     # values of parameters: 1 for those that are not known
     p = np.ones(length(reader.layout)) if reader.p is None else reader.p
+    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
+    bending = Bending(reader.graph, roots, p) if any(map(_is_steep, moving)) else None
     for condition, node in _undeclared(reader, rates, falls, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = _factors_of_time(reader.graph, condition)
         if condition in timed or condition not in inside:
             count += condition in only_shown
             continue
-        bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
+        bends = condition.op in _BENDS or (bending is not None and bending.only_bends(condition))
         path, functions = "" if node is None else node.path, _with_sides(reader.graph, condition)
         one = Located(function=condition, block=path, what=condition.op, bends=bends)
         rows, left = _entered(located, known, functions, one, node, rows)

@@ -19,11 +19,13 @@ from ...sampling.system import Happening, Sampled, oldest, rounded
 from ...wording import counted
 from ..codegen.newton import inside, solver
 from ..codegen.solver import Solver
+from ..diagram.checks import refused_block
 from ..diagram.nodes import Node
 from ..diagram.program import check_continuous, count_guards, count_switching_functions, memory
 from ..diagram.schedule import AlgebraicLoop, Combination, Schedule, Signal, signal_name
 from ..diagram.trace import feedthrough, time, traced_parameters
 from ..opaque.called import Call, call_of
+from ..purity.registers import unfollowed
 
 BEYOND = "a loop in it takes more passes than are written out"
 
@@ -305,7 +307,7 @@ class Reader:
 
         self.graph.is_cut = False
         try:
-            parts = [trace(self.graph, function, arguments) for function in functions]
+            parts = [trace(self.graph, f, arguments, node.registers) for f in functions]
             result = concatenated(self.graph, parts)
             if result.size != count:
                 raise Untraceable(f"it returns {counted(result.size, 'value')}, not {count}")
@@ -325,6 +327,8 @@ class Reader:
     ) -> Tracer:
         """Return the results of an opaque call."""
         node, slots = self.blocks[i], self.layout[i]
+        if node.registers:
+            raise refused_block(node.path, kind, unfollowed(node.registers, reason))
         name = f"{_labels(self.blocks)[i]}_{kind}_of_one"
         if name not in self.calls:
             self.calls[name] = call_of(name, node, kind, functions, slots, count, reason)

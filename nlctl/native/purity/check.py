@@ -16,10 +16,12 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
+from ...expressions.registers import Register
 from ...expressions.source import Definition, Unreadable, definition, source_file
 from . import known_calls, made
 from .captured import Captured, noted_function, noted_partial
 from .expressions import Frame
+from .registers import check_apart
 from .statements import CallWalker
 from .values import (
     FRESH,
@@ -43,7 +45,7 @@ from .values import (
     least_upper_bound,
     python_function,
 )
-from .walk import Walk
+from .walk import Registers, Walk
 
 _BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
 
@@ -59,6 +61,7 @@ class FunctionReading:
     numba_differs: tuple[str, ...]
     # where it writes messages: it may be computed from its expressions alone, which reach none
     messages: tuple[Message, ...]
+    registers: tuple[Register, ...] = ()  # what it writes into what was there before
 
 
 def check_pure(function: object, arguments: Sequence[KnownValue]) -> FunctionReading:
@@ -71,19 +74,24 @@ def check_pure(function: object, arguments: Sequence[KnownValue]) -> FunctionRea
     walk = FunctionWalk()
     try:
         walk.call(captured(function), Given(tuple(arguments)))
+        while walk.learnt:  # it may have read before what it writes later
+            walk = FunctionWalk(walk.registers)
+            walk.call(captured(function), Given(tuple(arguments)))
     except RecursionError:
         raise Impure("calls itself too deeply to be followed", "make it simpler") from None
+    registers = tuple(register for register, _ in walk.registers.values())
+    check_apart(registers, walk.read.values(), is_same=True)
     return FunctionReading(
         captured=tuple(walk.read.values()), numba_differs=tuple(dict.fromkeys(walk.numba_differs)),
-        messages=tuple(walk.messages),
+        messages=tuple(walk.messages), registers=registers,
     )  # fmt: skip
 
 
 class FunctionWalk(Walk):
     """Walks a function and all that it calls, with what each kind of thing does when called."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, registers: Registers | None = None) -> None:
+        super().__init__(registers)
         self.done: dict[Any, KnownValue] = {}
         self.keeping: set[Any] = set()  # of these, what puts something into lists
         self.walked: set[ast.AST] = set()  # functions inside others, while they are walked

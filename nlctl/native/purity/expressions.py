@@ -17,7 +17,7 @@ from ...expressions.source import cells_of, source_file
 from . import handed_on, known_calls, made
 from .captured import GONE, Captured
 from .known_calls import MEMORY
-from .parts import names_read, part_at, part_of_one, part_of_row
+from .parts import is_plain_attribute, names_read, part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
     OUTSIDE,
@@ -42,6 +42,7 @@ from .values import (
     forgotten,
     handed_out_again,
     holder,
+    is_itself_alone,
     least_upper_bound,
     library,
     maybe_shared,
@@ -58,6 +59,7 @@ OPERATORS = {
     ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne",
 }  # fmt: skip
 _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
+_SAME = (ast.Eq, ast.NotEq, ast.Is, ast.IsNot)
 _SIGNS = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__", ast.Not: "__bool__"}
 
 
@@ -155,9 +157,13 @@ class Expressions(ast.NodeVisitor):
             for thing in objects:
                 self.write_object(target, thing, value)
             return
+        if isinstance(base.known, OneOf) and all(
+            self.walk.writes(thing, target, value, self.frame.function) for thing in objects
+        ):
+            return
         if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
-        if not base.own:
+        if not base.own and not self.walk.writes(base, target, value, self.frame.function):
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
         self.kept(base, [value])
@@ -187,6 +193,7 @@ class Expressions(ast.NodeVisitor):
         """Note that lists of the call, and of objects that it made, hold what it has not made."""
         names = self.frame.names
         names.update({k: maybe_shared(v) for k, v in names.items() if v.holds})
+        self.walk.lists_may_hold_others()
         for thing in self.walk.objects:
             for name, value in list(thing.attributes.items()):
                 if value.holds and value.inside and not isinstance(value.known, Instance):
@@ -245,6 +252,9 @@ class Expressions(ast.NodeVisitor):
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
         values = [self.visit(part) for part in (node.left, *node.comparators)]
         for test, left, right in zip(node.ops, values, values[1:], strict=False):
+            if isinstance(test, _SAME) and all(map(is_itself_alone, (left, right))):
+                self.walk.numba_differs += ["identity"]
+                return FRESH
             self.operated(type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
@@ -372,15 +382,15 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                self.walk.captured(vars(thing), name, getattr(thing, name, None))  # of a first call
+                self.walk.captured(*self.walk.first_result(thing, name))
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
-            self.walk.captured(type(thing), name, entry)
+            self.walk.captured(type(thing), name, self.walk.unwritten(thing, name, entry))
             return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
-        if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
+        if isinstance(thing, ModuleType) or is_plain_attribute(thing, name):
             if isinstance(value := getattr(thing, name, UNKNOWN_VALUE), Unknown):  # it raises
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and (
@@ -482,18 +492,3 @@ class Expressions(ast.NodeVisitor):
         # whatever is in a list is only handed on
         if not isinstance(value.known, ListOf) and not known_calls.iterates(self.walk, value):
             known_calls.check_object(value, "goes through")
-
-
-def _is_plain_attribute(thing: object, name: str) -> bool:
-    """Whether reading an attribute of an object runs no code that could do anything."""
-    if library(type(thing)) is not None or isinstance(thing, type | super):
-        return True
-    member = inspect.getattr_static(thing, name, UNKNOWN_VALUE)
-    if member is UNKNOWN_VALUE:
-        return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
-    simple = (FunctionType, staticmethod, classmethod)
-    return (
-        isinstance(member, simple)
-        or not hasattr(type(member), "__get__")
-        or (type(member).__name__ in ("member_descriptor", "_tuplegetter", "getset_descriptor"))
-    )

@@ -52,7 +52,8 @@ def _functions_in(given: Sequence[KnownValue]) -> Any:
 def rows_of_functions(thing: object, given: Sequence[KnownValue]) -> Any:
     """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
     kept = _functions_in(given)
-    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
+    is_mixed = not all(v.inside for v in given) and any(v.own and v.inside for v in given)
+    if not (isinstance(kept, ListOf) or is_mixed) or thing not in (zip, enumerate):
         return kept
     parts = tuple(map(element, given))
     parts = parts if thing is zip else (FRESH, parts[0])

@@ -1,5 +1,9 @@
 """Names of functions and methods: what they do to what they are given."""
 
+from ...expressions.effects import CHANGING as CHANGING
+from ...expressions.effects import IN_PLACE as IN_PLACE
+from ...expressions.effects import WRITERS as WRITERS
+
 # functions and methods that may return part of what they are given
 VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
          "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
@@ -9,11 +13,6 @@ VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d
          "asarray_chkfinite"}  # fmt: skip
 LISTS_OF_VIEWS = {"broadcast_arrays", "split", "array_split", "hsplit", "vsplit", "dsplit",
                   "unstack", "meshgrid"}  # fmt: skip
-WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
-           "insort_left", "insort_right", "heappush", "heappop", "heapify", "heapreplace",
-           "heappushpop"}  # fmt: skip
-IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
-            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
 # of tables and columns of pandas, without inplace=True
 _OF_COLUMNS = {"abs", "idxmax", "idxmin", "sort_values", "sort_index", "set_index", "reset_index",
                "fillna", "dropna", "cummax", "cummin", "reindex", "to_dict", "iterrows",
@@ -32,10 +31,6 @@ READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj"
            "intersection", "isdisjoint", "issubset", "issuperset", "most_common",
            "reduce", "accumulate", "outer", "limit_denominator", *_OF_TEXTS,
            *_OF_COLUMNS}  # fmt: skip
-CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
-            "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
-            "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
-            "rotate"}  # fmt: skip
 # of sparse matrices, what changes them; of laws of probability; of tables of pandas
 OF_SPARSE = ("setdiag", "resize", "sort_indices", "sum_duplicates", "eliminate_zeros", "prune")
 OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "logsf", "ppf", "pmf", "logpmf", "isf", "mean",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from dataclasses import replace
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from .values import (
     OUTSIDE,
     PLAIN,
+    UNKNOWN_VALUE,
     Impure,
     Instance,
     KnownValue,
@@ -83,3 +85,20 @@ def names_read(
         raise Impure("calls getattr() by a name that is only known when it runs", "write it")
     held = thing.attributes if isinstance(thing, Instance) else getattr(thing, "__dict__", {})
     return sorted(n for n in {*held, *dir(cls)} if not n.startswith("__")), others
+
+
+def is_plain_attribute(thing: object, name: str) -> bool:
+    """Whether reading an attribute of an object runs no code that could do anything."""
+    if library(type(thing)) is not None or isinstance(thing, type | super):
+        return True
+    member = inspect.getattr_static(thing, name, UNKNOWN_VALUE)
+    if member is getattr(thing, "__dict__", {}).get(name, UNKNOWN_VALUE) is not UNKNOWN_VALUE:
+        return True  # its own is a plain value, whatever it is
+    if member is UNKNOWN_VALUE:
+        return getattr(type(thing), "__getattr__", None) in (None, dict.__getitem__, dict.get)
+    simple = (FunctionType, staticmethod, classmethod)
+    return (
+        isinstance(member, simple)
+        or not hasattr(type(member), "__get__")
+        or (type(member).__name__ in ("member_descriptor", "_tuplegetter", "getset_descriptor"))
+    )

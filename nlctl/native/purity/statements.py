@@ -123,7 +123,11 @@ class CallWalker(Expressions):
         ):
             text = ast.unparse(node.target)
             raise Impure(f"changes '{text}' in place, which it did not make", CHANGES)
-        if base.holds and not base.inside:
+        if isinstance(node.target, ast.Attribute) and self.walk.writes(
+            base, node.target, FRESH, self.frame.function
+        ):
+            added = least_upper_bound([self.attribute(base, node.target.attr), added])
+        elif base.holds and not base.inside:
             text = ast.unparse(node.target.value)
             raise Impure(f"changes an element of '{text}'", f"{MEMORY}, or {CHANGES}")
         numbers = added.inside and isinstance(added.known, Unknown | np.ndarray)

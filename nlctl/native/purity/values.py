@@ -306,6 +306,18 @@ def is_somebodys(thing: object) -> bool:
     return not isinstance(thing, plain) and library(type(thing)) is None
 
 
+def was_there(thing: object) -> bool:
+    """Whether a thing is an object of somebody's class that was there before the call."""
+    kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
+    return is_somebodys(thing) and not isinstance(thing, kinds)
+
+
+def is_itself_alone(value: KnownValue) -> bool:
+    """Whether a value is an object that was there before, and equal to itself alone."""
+    every = value.known.choices if isinstance(value.known, OneOf) else (value,)
+    return all(was_there(v.known) and type(v.known).__eq__ is object.__eq__ for v in every)
+
+
 def maybe_shared(value: KnownValue) -> KnownValue:
     """Return what is known of a list that may have been given what the call has not made."""
     known = UNKNOWN_VALUE if value.known is ARRAYS else value.known

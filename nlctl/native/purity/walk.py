@@ -3,13 +3,32 @@
 from __future__ import annotations
 
 import ast
+import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
+from ...expressions.registers import Register
+from ...expressions.source import source_file
 from .captured import Captured, noted
-from .values import Given, Instance, KnownValue, Message, captured
+from .registers import has_plain_fields, is_workspace, may_be_kept, refused_register
+from .values import (
+    Given,
+    Instance,
+    KnownValue,
+    Message,
+    captured,
+    least_upper_bound,
+    maybe_shared,
+    was_there,
+)
+
+Registers = dict[tuple[int, str], tuple[Register, KnownValue]]
+WORKSPACE = KnownValue(True, True)  # a list or an array of numbers
 
 
 class Walk(ABC):
@@ -19,7 +38,10 @@ class Walk(ABC):
     they meet on the way is kept here.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, registers: Registers | None = None) -> None:
+        # what is written into what was there before, and what is known of its values
+        self.registers: Registers = {} if registers is None else registers
+        self.learnt = False  # whether there is more of it than before the walk
         self.read: dict[tuple[int, str], Captured] = {}
         self.numba_differs: list[str] = []  # see `FunctionReading`
         self.messages: list[Message] = []
@@ -31,9 +53,76 @@ class Walk(ABC):
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
+        if (id(holder), name) in self.registers:
+            return self.registers[id(holder), name][1]
+        if (id(value), "") in self.registers:  # which one it is counts, not what is in it
+            self.read[id(holder), name] = Captured(holder, name, value)
+            return self.registers[id(value), ""][1]
         if (id(holder), name) not in self.read:
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
+
+    def writes(
+        self, base: KnownValue, target: ast.Subscript | ast.Attribute, value: KnownValue,
+        function: Callable[..., Any],
+    ) -> bool:  # fmt: skip
+        """Note that a function writes into what was there before; return whether it may."""
+        thing, place = base.known, f"{source_file(function)}, line {target.lineno}"
+        if isinstance(target, ast.Subscript):
+            return self._written(Register(thing, "", ast.unparse(target.value), place), value)
+        setter = inspect.getattr_static(type(thing), target.attr, None)
+        if not isinstance(setter, property) or not setter.fset or not was_there(thing):
+            return self._written(Register(thing, target.attr, ast.unparse(target), place), value)
+        self.captured(type(thing), target.attr, setter)
+        self.call(captured(setter.fset), Given((base, value)))
+        return True
+
+    def _written(self, register: Register, value: KnownValue) -> bool:
+        """Note that a field, or elements, are written; return whether they can be."""
+        thing, name = register.holder, register.name
+        fits = has_plain_fields(thing, name) if name else self._is_read(thing)
+        if not fits or not may_be_kept(value):
+            return False
+        before = getattr(thing, name, 0.0) if name else thing
+        if isinstance(before, np.ndarray) and is_workspace(before):  # unknown numbers in a copy
+            self._register(replace(register, holder=before, name=""), WORKSPACE)
+            before = 0.0
+        if name:
+            kept = least_upper_bound([captured(before), value])
+            self._register(register, KnownValue(kept.own, kept.inside, kept.holds))
+        elif isinstance(thing, list):
+            self._register(register, replace(WORKSPACE, holds=True))
+        return True
+
+    def _is_read(self, thing: object) -> bool:
+        """Whether a list or an array of numbers was read from around the function, as it is."""
+        is_read = any(note.now is thing for note in self.read.values())
+        return is_read and is_workspace(thing)
+
+    def lists_may_hold_others(self) -> None:
+        """Note that lists that are registers hold what the call has not made."""
+        for register, value in list(self.registers.values()):
+            if value.holds and value.inside:
+                self._register(register, maybe_shared(value))
+
+    def first_result(self, thing: Any, name: str) -> tuple[Any, str, Any]:
+        """Return where an object keeps the result of a first call."""
+        return vars(thing), name, self.unwritten(thing, name, getattr(thing, name, None))
+
+    def unwritten(self, thing: object, name: str, value: Any) -> Any:
+        """Return what an object keeps of a first call, unless it is then written into."""
+        for register, _ in self.registers.values():
+            if register.holder is thing and register.name:
+                raise refused_register(
+                    register, f"keeps '{name}' of the first call, and then writes into"
+                )
+        return value
+
+    def _register(self, register: Register, value: KnownValue) -> None:
+        one, known = self.registers.get(register.key, (register, value))
+        now = least_upper_bound([known, value])
+        self.learnt |= register.key not in self.registers or now != known
+        self.registers[register.key] = one, now
 
     def new_object(self, cls: type) -> Instance:
         """Return an object that the call has made, of which nothing is known yet."""

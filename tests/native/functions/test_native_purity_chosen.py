@@ -30,7 +30,7 @@ class Spring:
 
     def counted(self, x):
         self.asked += 1
-        return -x
+        return -x * self.asked
 
 
 class Damper(Spring):

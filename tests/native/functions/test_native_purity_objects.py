@@ -81,6 +81,10 @@ class Holder:
     def write(self):
         self.array[0] = 1.0
 
+    def grow(self):
+        self.array[0] += 1.0
+        return self.array[0]
+
 
 def noting(v):
     SEEN.append(v)
@@ -334,7 +338,7 @@ CASES = {
     "list inside": lambda t, x, u, p: [sum(f(x[0]) for f in [np.sin, noting])],
     "list inside by index": lambda t, x, u, p: [[np.sin, noting][1](x[0])],
     "list in a list": lambda t, x, u, p: [[[np.sin, noting]][0][1](x[0])],
-    "method of an object outside": lambda t, x, u, p: [HOLDER.write() or -x[0]],
+    "method of an object outside": lambda t, x, u, p: [HOLDER.grow() - x[0]],
 } | {
     f.__name__: f
     for f in (reduced, by_vectorize, keeps_an_array_of_the_caller, writes_what_itemgetter_found,

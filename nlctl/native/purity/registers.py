@@ -1,0 +1,115 @@
+"""What a function writes into objects that were there before: fields, elements of lists and arrays.
+
+A field that is written before it is read is a variable of the call, wherever it is kept.  One that
+is read as the call before left it is memory, and python-control's integrators call a function
+several times a step.  Which it is, the trace finds out: what was there before is an unknown in it,
+and nothing that is returned may depend on one.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ...expressions.registers import REAL_NUMBERS, Register
+from .captured import Captured, held_attributes
+from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
+
+_RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__")
+_DEPTH = 3  # of lists in lists, and of objects of libraries, that are searched for arrays
+
+
+REMEMBERS = (
+    "integrators call it several times a step, in any order: make what it remembers a state of the "
+    "block, of one with dt= where it is sampled"
+)
+
+
+def refused_register(register: Register, what: str) -> Impure:
+    """Return why a function is not one of its arguments alone."""
+    error = Impure(f"{what} '{register.title}'", REMEMBERS)
+    error.place = register.place
+    return error
+
+
+def unfollowed(registers: Sequence[Register], why: str) -> Impure:
+    """Return why a function that writes into what was there before is not written out."""
+    named = [r for r in registers if f"'{r.title}'" in why]
+    if not named or not why.startswith("it "):
+        error = refused_register(registers[0], "writes into")
+        error.advice = f"write to variables of its own, or as expressions what is none: {why}"
+        return error
+    error = refused_register(named[0], "")
+    error.reason = why.removeprefix("it ")
+    return error
+
+
+def has_plain_fields(thing: object, name: str) -> bool:
+    """Whether writing a field of an object that was there before does nothing else."""
+    cls = type(thing)
+    if cls is SimpleNamespace:
+        return True
+    if not was_there(thing) or isinstance(thing, type) or not hasattr(thing, "__dict__"):
+        return False
+    foreign = [c for c in cls.__mro__ if c is not object and library(c) is not None]
+    ruling = [n for n in _RULING if inspect.getattr_static(cls, n, None) is not (
+        inspect.getattr_static(object, n, None))]  # fmt: skip
+    member = inspect.getattr_static(cls, name, None)
+    return not foreign and not ruling and not hasattr(type(member), "__set__")
+
+
+def may_be_kept(value: KnownValue) -> bool:
+    """Whether a value is one of numbers, arrays and lists of these: no object, no function."""
+    return not isinstance(function_choice([value]), OneOf)
+
+
+def is_workspace(thing: object) -> bool:
+    """Whether the elements of a list or an array are numbers that nobody else has a view of."""
+    if type(thing) is np.ndarray:
+        return thing.dtype == float and thing.base is None and thing.ndim > 0
+    return type(thing) is list and all(type(v) in REAL_NUMBERS for v in thing)
+
+
+def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_same: bool) -> None:
+    """Check that nothing of what a function reads from around it is a register under other names.
+
+    Within the function that writes them (`is_same`) one list or array is known by its identity.
+    """
+    by_key = {r.key: r for r in registers} | {(id(r.holder), "__dict__"): r for r in registers}
+    spaces = [r for r in registers if not r.name]
+    for note in notes if registers else ():
+        if (register := by_key.get((id(note.holder), note.name))) is not None:
+            raise refused_register(register, "shares with another function what it writes into")
+        whole = note.now
+        for register in spaces:
+            if any(_are_one(register.holder, v, is_same and v is whole) for v in _parts(whole)):
+                raise refused_register(register, "knows under another name what it writes into")
+
+
+def _are_one(space: Any, value: Any, is_known: bool) -> bool:
+    """Whether writing one list or array changes another."""
+    if value is space:
+        return not is_known
+    both = isinstance(value, np.ndarray) and isinstance(space, np.ndarray)
+    return both and np.may_share_memory(value, space)
+
+
+def _parts(value: Any, depth: int = _DEPTH) -> Iterator[Any]:
+    """Yield a value, and what a list or an object of a library holds."""
+    yield value
+    if not depth or isinstance(value, (*PLAIN, np.ndarray, type)):
+        return
+    if isinstance(value, list | tuple | set | frozenset):
+        inner: Iterable[Any] = value
+    elif isinstance(value, Mapping):
+        inner = value.values()
+    elif library(type(value)) in (None, "builtins"):
+        return
+    else:
+        inner = held_attributes(value).values()
+    for part in inner:
+        yield from _parts(part, depth - 1)
