@@ -92,7 +92,8 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     read = [note for place in places(system) for note in _equations_of(place.system)]
     read += [note for one in blocks for note in _equations_of(one)]
     readings = [  # before any is called
-        check_functions(place.path, one) for place, one in zip(wiring.blocks, blocks, strict=True)
+        check_functions(place.path, one, may_write=True)
+        for place, one in zip(wiring.blocks, blocks, strict=True)
     ]
     check_registers({p.path: r for p, r in zip(wiring.blocks, readings, strict=True)})
     read += [note for reading in readings for note in reading.captured]

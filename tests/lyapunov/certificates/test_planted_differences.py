@@ -172,6 +172,12 @@ class SlowBurst(nlctl.controllers.KnownSignLaw):
 
 
 def counted(t, x, u, p):
+    """Another plant from the 100,000th call on."""
+    COUNTS[0] += 1
+    return UPDATE(t, x, u, p) if COUNTS[0] < 100_000 else (0.0, 0.0)
+
+
+def only_counted(t, x, u, p):
     COUNTS[0] += 1
     return UPDATE(t, x, u, p)
 
@@ -215,6 +221,9 @@ EQUATIONS = {
         lambda: {"plant": plant(states=("x2", "x1"))}, "needs the states x1, x2 of block 'plant'",
     ),
     "a plant that counts": (lambda: {"plant": plant(counted)}, "changes|remember|COUNTS"),
+    "a plant that counts for itself": (
+        lambda: {"plant": plant(only_counted)}, "changes|remember|COUNTS",
+    ),
     "a plant that draws": (lambda: {"plant": plant(drawn)}, "'plant'"),
     "a filter of another kind": (
         lambda: {
