@@ -18,7 +18,7 @@ from ...upstream.control_internals import current_parameters, outputs_now, rates
 from ...upstream.systems import System
 from ...wording import counted
 from ..purity.check import FunctionReading, check_pure
-from ..purity.registers import check_apart, refused_register
+from ..purity.registers import check_apart
 from ..purity.values import FRESH, VECTOR, Impure, captured
 from .parameters import current_values
 
@@ -35,21 +35,18 @@ def check_sizes(system: System, blocks: Iterable[Any]) -> None:
 
 def check_functions(path: str, system: System, *, may_write: bool = False) -> FunctionReading:
     """Check that a block's functions depend on their arguments alone, and return enough values."""
-    # The functions are read, not called, until they are known to remember nothing. Only who traces
-    # them with what they write into may let them write: whether they read what another call has
-    # left there is seen in no other way.
+    # The functions are read, not called, until they are known to remember nothing.
     is_block, readings = isinstance(system, Block), []
     for what, function in _functions(system):
         values = current_parameters(system) if is_block else current_values(system)
         check_arguments(f"block '{path}'", what, function, ("t", "x", "u", "params"))
         try:
-            reading = check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)])
+            given = [FRESH, VECTOR, VECTOR, captured(values)]
+            reading = check_pure(function, given, may_write=may_write)
             readings.append(reading)
             for other in readings[:-1]:
                 check_apart(reading.registers, other.captured, is_same=False)
                 check_apart(other.registers, reading.captured, is_same=False)
-            if reading.registers and not may_write:
-                raise refused_register(reading.registers[0], "changes")
         except Impure as error:
             raise refused_block(path, what, error) from None
     messages = [message for reading in readings for message in reading.messages]

@@ -21,7 +21,7 @@ from ...expressions.source import Definition, Unreadable, definition, source_fil
 from . import known_calls, made
 from .captured import Captured, noted_function, noted_partial
 from .expressions import Frame
-from .registers import check_apart
+from .registers import check_apart, refused_register
 from .statements import CallWalker
 from .values import (
     FRESH,
@@ -64,8 +64,12 @@ class FunctionReading:
     registers: tuple[Register, ...] = ()  # what it writes into what was there before
 
 
-def check_pure(function: object, arguments: Sequence[KnownValue]) -> FunctionReading:
+def check_pure(
+    function: object, arguments: Sequence[KnownValue], *, may_write: bool = False
+) -> FunctionReading:
     """Check that a function depends on its arguments alone and changes nothing."""
+    # Only who traces it with what it writes into may let it write: whether it reads what another
+    # call has left there is seen in no other way.
     plain = python_function(function)
     if plain is not None and inspect.isgeneratorfunction(plain):
         error = Impure("yields its values", "return them as a list")
@@ -80,6 +84,8 @@ def check_pure(function: object, arguments: Sequence[KnownValue]) -> FunctionRea
     except RecursionError:
         raise Impure("calls itself too deeply to be followed", "make it simpler") from None
     registers = tuple(register for register, _ in walk.registers.values())
+    if registers and not may_write:
+        raise refused_register(registers[0], "changes")
     check_apart(registers, walk.read.values(), is_same=True)
     return FunctionReading(
         captured=tuple(walk.read.values()), numba_differs=tuple(dict.fromkeys(walk.numba_differs)),
