@@ -194,15 +194,25 @@ def one_sided(
     for node in needed(exprs):
         args = tuple(new.get(a, a) for a in node.args)
         if node.op in ("maximum", "minimum", "absolute") and node.varies:
-            pair = list(map(graph.number, args))
-            if node.op == "absolute":
-                pair.append(graph.op("neg", pair[0]))
-            changes = slopes(graph, pair, direction, solutions)
-            rates = [graph.const(0.0) if rate is None else rate for rate in changes]
-            order = "lt" if node.op == "minimum" else "gt"
-            ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))
-            first = graph.op("or", graph.op(order, *pair), ahead)
-            new[node] = graph.op("select", first, *pair)
+            new[node] = _leading(graph, node.op, args, direction, solutions)
         elif args != node.args:
             new[node] = graph.like(node, *args)
     return [new.get(e, e) for e in exprs]
+
+
+def _leading(
+    graph: Graph,
+    op: str,
+    args: Sequence[Expr],
+    direction: Direction,
+    solutions: Mapping[str, Sequence[Expr]],
+) -> Expr:
+    pair = list(map(graph.number, args))
+    if op == "absolute":
+        pair.append(graph.op("neg", pair[0]))
+    changes = slopes(graph, pair, direction, solutions)
+    rates = [graph.const(0.0) if rate is None else rate for rate in changes]
+    order = "lt" if op == "minimum" else "gt"
+    ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))
+    first = graph.op("or", graph.op(order, *pair), ahead)
+    return graph.op("select", first, *pair)

@@ -57,7 +57,7 @@ def machine_code(key: str, request: Wanted) -> Any:
         return request.function
     place = store_key(key, str(request.signature), request.options)
     code: Any = numba.njit(**request.options)(request.function)
-    give_cache(code, _Stored(lambda signature: place))
+    give_cache(code, _Stored(place))
     code.compile(request.signature)
     code.disable_compile()
     return code
@@ -78,16 +78,16 @@ def machine_code_if_taken(key: str, request: Wanted) -> Any:
 
 
 class _Stored(CodeCache):
-    """Gives numba the code of a function from the store, by the key of a signature, or takes it."""
+    """Gives numba the code of a function of one signature from the store, or takes it."""
 
-    def __init__(self, key: Callable[[object], str]) -> None:
+    def __init__(self, key: str) -> None:
         self.key = key
 
     def load(self, signature: object) -> Any:
-        return _read(self.key(signature))
+        return _read(self.key)
 
     def save(self, signature: object, data: object) -> None:
-        _write(self.key(signature), data)
+        _write(self.key, data)
 
 
 def store_key(key: str, *more: object) -> str:
