@@ -13,6 +13,7 @@ from numba import types
 from numpy.typing import ArrayLike
 
 from nlctl.host.checkout import file_of_nlctl
+from nlctl.native.machine.export import AS_SHIPPED
 from nlctl.native.machine.machine_code import Wanted
 from nlctl.native.machine.shipped import Shipped
 
@@ -31,7 +32,7 @@ def _wanted(function: Callable[..., Any], result: Any, breaks: Any = _ROW) -> Wa
     return Wanted(
         function=function,
         signature=result(*(kinds.get(name, types.float64) for name in names)),
-        options={"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+        options=AS_SHIPPED,
         name=_name(function, breaks is not types.none),
     )
 
@@ -96,20 +97,21 @@ def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return how machine code of a function is called with the function's arguments."""
     signature = inspect.signature(function)
-    names = [*signature.parameters][2:]
-    defaults = {n: signature.parameters[n].default for n in names}
-    defaults = {n: value for n, value in defaults.items() if value is not inspect.Parameter.empty}
     codes = [SAMPLE_FUNCTIONS.functions.get(_name(function, known)) for known in (False, True)]
 
     @functools.wraps(function)
-    def called(t: np.ndarray, y: np.ndarray, *given: float, **named: Any) -> Any:
-        values = defaults | dict(zip(names, given, strict=False)) | named
-        fits = np.shape(t) == np.shape(y) and np.size(t) > 1 and values.keys() == set(names)
-        if not fits or len(given) > len(names) or any(n in named for n in names[: len(given)]):
-            return function(t, y, *given, **named)  # says what is wrong
-        code: Any = codes[values.get("breaks") is not None]
-        if values.get("breaks") is not None:
-            values["breaks"] = as_row(values["breaks"])
-        return code(as_row(t), as_row(y), *map(values.get, names))
+    def called(*given: Any, **named: Any) -> Any:
+        try:
+            bound = signature.bind(*given, **named)
+        except TypeError:
+            return function(*given, **named)  # says what is wrong
+        bound.apply_defaults()
+        values = bound.arguments
+        if np.shape(values["t"]) != np.shape(values["y"]) or np.size(values["t"]) < 2:
+            return function(*given, **named)
+        rows = [name for name in ("t", "y", "breaks") if values.get(name) is not None]
+        values |= {name: as_row(values[name]) for name in rows}
+        code: Any = codes["breaks" in rows]
+        return code(*values.values())
 
     return called

@@ -40,7 +40,7 @@ _ENDS = 17  # points from the last sample to a break
 
 @equation
 def largest_of(y):
-    """Return the largest value, NaN if there is one: of `numpy.max` shipped code has nothing."""
+    """Return the largest value, NaN if there is one; `numpy.max` calls what only numba has."""
     return y[np.argmax(y)]
 
 

@@ -12,6 +12,7 @@ from ..upstream.numba_internals import is_jit_disabled
 from .integrate import advance, evaluate, start
 from .integrate.workspace import TASK, WORK
 from .machine.address import data_address
+from .machine.export import AS_SHIPPED
 from .machine.machine_code import Wanted
 from .machine.shipped import Shipped
 
@@ -22,7 +23,7 @@ INTEGRATORS = Shipped(
         Wanted(
             function=function,
             signature=numba.void(*arguments),
-            options={"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+            options=AS_SHIPPED,
         )
         for function, *arguments in (
             (start.start, _ADDRESS, TASK, WORK),

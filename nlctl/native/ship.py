@@ -9,11 +9,13 @@ import ast
 import hashlib
 import inspect
 import json
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import llvmlite.binding as llvm
 import numba
@@ -39,7 +41,7 @@ def group_by_name(name: str) -> Shipped:
     return getattr(import_module(module), place)
 
 
-def ship(group: Shipped) -> None:
+def ship(group: Shipped, path: Path) -> None:
     """Write the bitcode, with what it was made of."""
     files, code = source_files(group), exported(group.wanted)
     header = {
@@ -50,7 +52,7 @@ def ship(group: Shipped) -> None:
         "numba": numba.__version__,
     }
     content = json.dumps(header).encode() + b"\n" + code
-    replace_file(group.path, lambda file: file.write(content))
+    replace_file(path, lambda file: file.write(content))
 
 
 def source_files(group: Shipped) -> list[str]:
@@ -136,7 +138,18 @@ def _imports(place: PurePosixPath, body: list[ast.stmt]) -> Iterator[tuple[str, 
                 yield each.asname or each.name, (str(there), "" if there is module else each.name)
 
 
+def _main(names: Sequence[str]) -> None:
+    """Make what no longer fits, or one of `SHIPPED`, in its place or as another file."""
+    # Each in a process of its own: of what one has compiled, also of numba's own functions, numba
+    # has no more than the optimised code for the next.
+    if names:
+        group = group_by_name(names[0])
+        ship(group, Path(*names[1:]) if names[1:] else group.path)
+        return
+    for name in SHIPPED:
+        if bitcode(group_by_name(name)) is None:
+            subprocess.run([sys.executable, "-m", "nlctl.native.ship", name], check=True)
+
+
 if __name__ == "__main__":
-    for group in map(group_by_name, SHIPPED):
-        if bitcode(group) is None:
-            ship(group)
+    _main(sys.argv[1:])

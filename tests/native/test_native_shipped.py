@@ -24,6 +24,7 @@ from nlctl import paper
 from nlctl.analysis.metrics import in_machine_code, settling_time
 from nlctl.native import driver, ship
 from nlctl.native.integrators import INTEGRATORS
+from nlctl.native.machine.export import AS_SHIPPED
 from nlctl.native.machine.machine_code import Wanted
 from nlctl.native.machine.shipped import Shipped, bitcode, callable_at, functions_of, sources_key
 from nlctl.native.ship import SHIPPED, group_by_name, source_files
@@ -230,12 +231,7 @@ def test_made_anew_it_is_the_same_file(name, tmp_path):
     if header(group)["numba"] != numba.__version__:
         pytest.skip("another numba")
     path = tmp_path / "code.bitcode"
-    script = (
-        "import sys; from dataclasses import replace; from pathlib import Path\n"
-        "from nlctl.native.ship import ship, group_by_name\n"
-        "ship(replace(group_by_name(sys.argv[1]), path=Path(sys.argv[2])))"
-    )
-    subprocess.run([sys.executable, "-c", script, name, path], check=True)
+    subprocess.run([sys.executable, "-m", "nlctl.native.ship", name, path], check=True)
     same = path.read_bytes() == group.path.read_bytes()
     assert same  # a difference of bytes would be printed for minutes
 
@@ -268,25 +264,21 @@ ROW, TABLE, PAIR = (
     types.float64[:, ::1],
     types.Tuple((types.float64, types.int64)),
 )
-ANY = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+SUMS = types.Tuple((types.int64, types.Tuple((types.float64, types.boolean))))
+REAL = types.float64
+SIGNATURES = {
+    "total": (total, SUMS(TABLE, REAL)),
+    "parts": (parts, types.UniTuple(ROW, 3)(ROW, types.int64)),
+    "without": (switched, REAL(PAIR, ROW, types.none)),
+    "switched": (switched, REAL(PAIR, ROW, REAL)),
+}
 SMALL = Shipped(
     path=Path("none"),
-    wanted=(
-        Wanted(
-            function=total,
-            signature=types.Tuple((types.int64, types.Tuple((types.float64, types.boolean))))(
-                TABLE, types.float64
-            ),
-            options=ANY,
-        ),
-        Wanted(function=parts, signature=types.UniTuple(ROW, 3)(ROW, types.int64), options=ANY),
-        Wanted(
-            function=switched, signature=types.float64(PAIR, ROW, types.none), options=ANY,
-            name="without",
-        ),
-        Wanted(function=switched, signature=types.float64(PAIR, ROW, types.float64), options=ANY),
+    wanted=tuple(
+        Wanted(function=function, signature=signature, options=AS_SHIPPED, name=name)
+        for name, (function, signature) in SIGNATURES.items()
     ),
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")
@@ -343,7 +335,7 @@ def test_what_only_numba_has_is_not_shipped():
 
     group = Shipped(
         path=Path("none"),
-        wanted=(Wanted(function=largest, signature=types.float64(ROW), options=ANY),),
+        wanted=(Wanted(function=largest, signature=types.float64(ROW), options=AS_SHIPPED),),
     )
     with pytest.raises(nlctl.errors.CompileError, match="which only numba has"):
         functions_of(group)

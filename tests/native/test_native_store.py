@@ -515,7 +515,7 @@ EDITS = {  # module -> what is edited there
     "integrate/control.py": ("SMALLEST = 4e-16", "SMALLEST = 5e-16"),
     "integrate/methods/explicit.py": ("if E.size == 7", "if E.size == 8"),
     "integrate/memory.py": ("_ENTRY = 5", "_ENTRY = 6"),
-    "integrate/state.py": ('"error_model": "numpy"', '"error_model": "python"'),
+    "machine/export.py": ('"error_model": "numpy"', '"error_model": "python"'),
     "machine/address.py": ("ir.VoidType()", "ir.IntType(32)"),
 }
 

@@ -13,15 +13,15 @@ from numba import types
 
 from ...host.checkout import file_of_nlctl
 from ..machine.address import call_enclosure
+from ..machine.export import AS_SHIPPED
 from ..machine.machine_code import Wanted
 from ..machine.shipped import Shipped
 
 ALL_PROVED, REFUTED, LEFT, FULL = range(4)
 FINEST = 1e-6  # of a tolerance: where the bound is near 0, nothing finer is tried
-_INNER = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-@numba.njit(**_INNER)
+@numba.njit(**AS_SHIPPED)
 def best_side(x, o, lane, weight, whole):
     """Return the side that matters most and can be divided; -1 for none."""
     best, side, n, known = -1.0, -1, whole.size, True
@@ -97,7 +97,7 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, bou
     return ALL_PROVED
 
 
-@numba.njit(**_INNER)
+@numba.njit(**AS_SHIPPED)
 def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds):
     """Judge the boxes that wait, and put them into the heap."""
     n, lanes, waiting = whole.size, x.shape[1], counts[0]
@@ -122,7 +122,7 @@ def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds
         counts[1] = heap_enter(keys, index, counts[1], o[0, lane], j)
 
 
-@numba.njit(**_INNER)
+@numba.njit(**AS_SHIPPED)
 def divide_first(nodes, index, keys, lanes, limits, counts, bounds):
     """Divide the boxes with the largest bounds: their halves wait."""
     tol, relative, most, hopeless = limits
@@ -148,7 +148,7 @@ def divide_first(nodes, index, keys, lanes, limits, counts, bounds):
         counts[0] += 2
 
 
-@numba.njit(**_INNER)
+@numba.njit(**AS_SHIPPED)
 def heap_enter(keys, index, size, key, what):
     """Put a box into the heap, the largest bound first, and return its size."""
     at = size
@@ -162,7 +162,7 @@ def heap_enter(keys, index, size, key, what):
     return size + 1
 
 
-@numba.njit(**_INNER)
+@numba.njit(**AS_SHIPPED)
 def heap_leave(keys, index, size):
     """Take the first box out of the heap, and return its size."""
     size -= 1
@@ -191,12 +191,12 @@ BOX_SEARCH = Shipped(
         Wanted(
             function=prove_below,
             signature=_COUNT(*_CODE, _TABLE, _ROW, _REAL, _COUNT, _COUNTS, _ROW),
-            options=_INNER,
+            options=AS_SHIPPED,
         ),
         Wanted(
             function=supremum,
             signature=_COUNT(*_CODE, _TABLE, _COUNT[:, ::1], _ROW, _ROW, _LIMITS, _COUNTS, _ROW),
-            options=_INNER,
+            options=AS_SHIPPED,
         ),
     ),
 )

@@ -7,6 +7,8 @@ from enum import IntEnum
 import numba
 import numpy as np
 
+from ..machine.export import AS_SHIPPED
+
 
 class Status(IntEnum):
     """How a run ended."""
@@ -31,11 +33,7 @@ FIRST_PATIENCE = 15
 DIRECTIONS = 8  # in which derivatives are taken together
 # for functions that only machine code calls: without a way in from Python, which would have to be
 # compiled as well
-INNER = {
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
+INNER = AS_SHIPPED
 
 _FIELDS = [
     ("t", "f8"),  # time reached

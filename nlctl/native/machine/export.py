@@ -26,6 +26,8 @@ from ...errors import CompileError
 from ...upstream.numba_internals import called_libraries, name_and_library, own_ir
 from .machine_code import Wanted
 
+# of `numba.njit`: for functions that are exported, and for those that they call
+AS_SHIPPED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 RETURNED, NONE = 0, -2
 RELEASE = "NRT_MemInfo_call_dtor"  # what gives memory back, can be called from outside as well
 _ELSEWHERE = ("NRT_", "numba_", "Py")  # functions that only a process with numba and Python has

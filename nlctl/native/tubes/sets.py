@@ -17,13 +17,14 @@ import math
 import numba
 import numpy as np
 
-from .intervals import AS_NUMPY, add_image, add_product, down, matrix_product, up, write_into
+from ..machine.export import AS_SHIPPED
+from .intervals import add_image, add_product, down, matrix_product, up, write_into
 
 _ROUNDED = 1e-13  # of all terms of a sum of less than 800
 _UP = 1.0 + 1e-12  # what sums of sizes may be rounded by
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def box_of_set(c, P, even, B, r, box):
     """Write the box around a set."""
     write_into(box, c)
@@ -36,7 +37,7 @@ def box_of_set(c, P, even, B, r, box):
     add_image(B, r, box)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def sizes(P, degrees, by_degree, whole):
     """Write the sums of the coefficients' sizes, of each degree and of all."""
     by_degree.fill(0.0)
@@ -46,7 +47,7 @@ def sizes(P, degrees, by_degree, whole):
         whole[i] = by_degree[i].sum() * _UP
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def next_polynomials(J, H, P, table, error):
     """Carry polynomials on, in place, and add what that leaves out to errors."""
     # Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
@@ -81,7 +82,7 @@ def next_polynomials(J, H, P, table, error):
         error[k, 0], error[k, 1] = down(error[k, 0] - around), up(error[k, 1] + around)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def polynomial_product(p, q, products, p_sizes, q_sizes, product):
     """Multiply polynomials, and return how large the product is beyond their degree at most."""
     product.fill(0.0)
@@ -94,7 +95,7 @@ def polynomial_product(p, q, products, p_sizes, q_sizes, product):
     return beyond * _UP
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def slopes_within(J, H, box, middle, K):
     """Write J + H d for all d between the middle and a box."""
     # With d = p + e, H (d, d) / 2 is H (p, p) / 2 and H (p + e / 2) e, and p + e / 2 is one of
@@ -108,7 +109,7 @@ def slopes_within(J, H, box, middle, K):
                 add_product(K[k, i], H[k, i, j, 0], H[k, i, j, 1], first, last)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def next_errors(K, error, at, c, B, r):
     """Move errors, in place: those of `r`, with `error` added; `c` becomes what is around `at`."""
     # Shapes: `K, B` (n, n, 2), `error, c, r` (n, 2), `at` (n,).
@@ -135,7 +136,7 @@ def next_errors(K, error, at, c, B, r):
     add_left_out(B, transposed, whole, c)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def transpose(x):
     """Return the transpose of a matrix of intervals, of shape (n, n, 2)."""
     y = np.empty_like(x)
@@ -146,7 +147,7 @@ def transpose(x):
     return y
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def add_left_out(B, transposed, x, c):
     """Add x - B B^T x, which is 0 but for rounding, to c."""
     n = x.shape[0]
@@ -159,7 +160,7 @@ def add_left_out(B, transposed, x, c):
     add_image(errors, x, c)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def renewed(c, P, even, B, r, most):
     """Begin with new numbers s where errors have become larger than a part of the polynomials."""
     # Return whether. What was there lies in a box along orthogonal directions, with a number for
@@ -204,7 +205,7 @@ def renewed(c, P, even, B, r, most):
     return True
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def in_directions(Q, P):
     """Return polynomials along orthogonal directions, without what is rounded."""
     parts = np.zeros(P.shape)
@@ -215,7 +216,7 @@ def in_directions(Q, P):
     return parts
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def orthogonal(columns, B):
     """Write orthogonal directions of columns, a matrix (n, m), those that matter most first."""
     n = columns.shape[0]
@@ -252,7 +253,7 @@ def orthogonal(columns, B):
                 rest[i, j] -= part * B[i, place, 0]
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def _without(v, B, count):
     """Take away what a vector has of the first columns, and return its length."""
     for _ in range(2):

@@ -14,12 +14,13 @@ import numba
 import numpy as np
 
 from ..machine.address import call_enclosure
-from .intervals import AS_NUMPY, down, interval_product, power_of_time, up, write_into
+from ..machine.export import AS_SHIPPED
+from .intervals import down, interval_product, power_of_time, up, write_into
 
 _TRIES = 2  # of what the rest may be, for one step size
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def coefficients(code, places, folds, box, orders, k, read, first):
     """Enclose the coefficients up to an order on a box in every lane."""
     # Shapes: `box` (4n, 2, lanes), `k` (orders + 1, rows, 2, lanes).
@@ -38,7 +39,7 @@ def coefficients(code, places, folds, box, orders, k, read, first):
         call_enclosure(code[1], read, k[order])
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def _sum_products(folds, order, k, read):
     """Add up what an order needs of those before."""
     for f in range(folds.shape[0]):
@@ -54,7 +55,7 @@ def _sum_products(folds, order, k, read):
                 least[lane], most[lane] = down(least[lane] + low), up(most[lane] + high)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def fill_lanes(box, middle, lanes):
     """Give each pair of directions a lane with the box, and each direction one with the middle."""
     # Shapes: `lanes` (groups, 4n, 2, lanes).
@@ -78,7 +79,7 @@ def fill_lanes(box, middle, lanes):
             lanes[(pairs + i) // width, n + i, end, (pairs + i) % width] = 1.0
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def flow_derivatives(lanes, at, J, H):
     """Read where the middle comes to, and both derivatives."""
     # Shapes: `at` (n, 2), `J` (n, n, 2), `H` (n, n, n, 2).
@@ -99,7 +100,7 @@ def flow_derivatives(lanes, at, J, H):
                 J[k, i, end] = lanes[(lane + i) // width, n + k, end, (lane + i) % width]
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def add_up(k, orders, time, rest, sums):
     """Write the polynomial at a time, an interval of shape (2,), with a rest of one more order."""
     # Shapes: `k` (orders + 2, rows, 2, lanes), `rest, sums` (4n, 2, lanes).
@@ -113,7 +114,7 @@ def add_up(k, orders, time, rest, sums):
             sums[i, 0, lane], sums[i, 1, lane] = low, high
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, first):
     """Find the rest of a step of size h; return whether there is one."""
     # Shapes: `k, ky` (groups, order + 2, rows, 2, lanes), `lanes, rest` (groups, 4n, 2, lanes),
@@ -144,7 +145,7 @@ def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, f
     return True
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def _exist(rates):
     """Whether the rates have values, and do not jump: higher coefficients may well have both."""
     holds = True
@@ -154,7 +155,7 @@ def _exist(rates):
     return holds
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def _widen(lanes, pad):
     for i in range(lanes.shape[0]):
         for lane in range(lanes.shape[2]):
@@ -162,7 +163,7 @@ def _widen(lanes, pad):
             lanes[i, 1, lane] = up(lanes[i, 1, lane] + pad[i, 1, lane])
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def _held(coefficient, power, pad):
     """Whether the rest lies where it was looked for; otherwise make that wider."""
     holds = True

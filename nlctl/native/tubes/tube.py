@@ -14,10 +14,10 @@ from numba import types
 
 from ...host.checkout import file_of_nlctl
 from ..enclosures.writer import LANES
+from ..machine.export import AS_SHIPPED
 from ..machine.machine_code import Wanted
 from ..machine.shipped import Shipped
 from .intervals import (
-    AS_NUMPY,
     add_image,
     add_product,
     down,
@@ -149,7 +149,7 @@ def integrated(
     return status, early, steps
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, pad, read, first):
     """Return the size of a step for which there is a rest, at most `most`; 0 for none."""
     groups, n, lanes = boxes.shape[0], boxes.shape[1] // 4, boxes.shape[3]
@@ -166,7 +166,7 @@ def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, 
     return 0.0
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def first_set(box, count):
     """Return the set {c + P(s) + B r} that is a box, of so many monomials."""
     n = box.shape[0]
@@ -180,7 +180,7 @@ def first_set(box, count):
     return c, P, B, r
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def carry_on(lanes, table, box, middle, c, P, B, r):
     """Carry a set on by a step, in place."""
     n = middle.size
@@ -197,7 +197,7 @@ def carry_on(lanes, table, box, middle, c, P, B, r):
     next_errors(K, error, point, c, B, r)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def step_size(k, order, lane, n, tol):
     """Return the step at which the last coefficients of the middle count for a tolerance."""
     scale, last, before = 0.0, 0.0, 0.0
@@ -211,7 +211,7 @@ def step_size(k, order, lane, n, tol):
     return min(one, other)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def span(k, ky, order, h, boxes, over):
     """Write where the states are during a step: in the first lane, which has the whole set."""
     power = np.empty(2)
@@ -225,7 +225,7 @@ def span(k, ky, order, h, boxes, over):
         over[i, 1] = up(boxes[i, 1, 0] + high)
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def range_over_step(ky, h, begin, end, over):
     """Narrow where the states are during a step, by where they are before and after it."""
     # A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second
@@ -237,7 +237,7 @@ def range_over_step(ky, h, begin, end, over):
         over[i, 1] = min(over[i, 1], up(max(begin[i, 1], end[i, 1]) + above))
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def write_limits(over, begin, end, low, high):
     """Enter a box into the parts of the time that a step has to do with."""
     cells = low.shape[0]
@@ -249,7 +249,7 @@ def write_limits(over, begin, end, low, high):
             high[cell, i] = max(high[cell, i], over[i, 1])
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def judged(over, end, limits):
     """Say what is known of the limits, from a step and from where it ends."""
     status = REACHED
@@ -264,14 +264,14 @@ def judged(over, end, limits):
     return status
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def back_to(end, rates, beyond):
     """Take back what the last step may have gone beyond the end."""
     for i in range(end.shape[0]):
         add_product(end[i], -beyond, 0.0, rates[i, 0, 0], rates[i, 1, 0])
 
 
-@numba.njit(**AS_NUMPY)
+@numba.njit(**AS_SHIPPED)
 def matter(P, table, box, weight):
     """Write how much each side of the first box has to do with what is not linear in it."""
     for j in range(weight.size):
@@ -297,7 +297,7 @@ TUBES = Shipped(
                 _MONOMIALS, _TABLE, _REAL, _TABLE, _COUNT, _REAL, _COUNT, _TABLE, _TABLE, _TABLE,
                 _ROW,
             ),
-            options=AS_NUMPY,
+            options=AS_SHIPPED,
         ),
     ),
 )  # fmt: skip

@@ -16,7 +16,8 @@ import numpy as np
 
 from ..control import shorten
 from ..state import INNER, is_stiff, opposite
-from .location import AGAIN, CLEAR, EVENT, REFUSED, SMALL_KINK, is_kink
+from .functions import at_zero
+from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
 BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
@@ -151,8 +152,8 @@ def _across(task, lane, w, j):
         return REFUSED
     for i in range(task.rows.switching):
         end = w.events.g[i, j]
-        is_small = is_kink(task, i) and abs(end) <= SMALL_KINK * task.atol
-        if not is_small and (has_crossed(task, w, i, end, j) or left_to_other_side(task, w, i, j)):
+        crossed = has_crossed(task, w, i, end, j) or left_to_other_side(task, w, i, j)
+        if crossed and not at_zero(task, i, end):
             lane.misses = 0
             return EVENT
     lane.misses += 1
