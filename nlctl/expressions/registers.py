@@ -45,7 +45,10 @@ class Kept:
         self.leaves = 0
 
     def begin(self) -> None:
-        """Forget what another way has written."""
+        """Forget what another way has written, but for the form that it leaves lists in."""
+        for key, value in self.values.items():
+            if not key[1]:
+                self.forms.setdefault(key, set()).add(_form(value))
         self.values = {}
 
     def has(self, holder: object, name: str = "") -> bool:
@@ -101,15 +104,22 @@ class Kept:
 
     def check(self, results: Iterable[Expr]) -> None:
         """Refuse what depends on what another call has left."""
+        self.begin()
+        self.ask(results)
+        for key, (_, form) in self.unknown.items():
+            if self.forms.get(key, {form}) != {form}:
+                title = self.registers[key].title
+                raise Untraceable(f"it leaves '{title}' in another form than it had")
+
+    def ask(self, numbers: Iterable[Expr]) -> None:
+        """Refuse numbers that another call has left, whose types are not known either."""
         if not self.unknown:
             return
-        places = {n.data[1] for n in needed(results) if n.op == "leaf" and n.data[0] == LEFT_OVER}
+        places = {n.data[1] for n in needed(numbers) if n.op == "leaf" and n.data[0] == LEFT_OVER}
         for key, (start, form) in self.unknown.items():
-            title = self.registers[key].title
             if places.intersection(range(start, start + int(np.prod(form[1])))):
+                title = self.registers[key].title
                 raise Untraceable(f"it remembers '{title}' from one call to the next")
-            if self.forms.get(key, {form}) != {form}:
-                raise Untraceable(f"it leaves '{title}' in another form than it had")
 
 
 def _form(value: Any) -> tuple[str, tuple[int, ...]] | None:

@@ -162,11 +162,17 @@ class Builtins:
         )
         both = (*kinds, *(originals[k] for k in kinds if k in originals))
         if isinstance(thing, Tracer):
+            self._asked(thing)
             return self._is_number(thing, both)
         if callable(thing) and any(k in both for k in (*_FUNCTIONS, np.ufunc)):
             raise Untraceable("the type of a function")
         real = thing.__dict__["_real"] if hasattr(type(thing), "_forwards") else thing
         return isinstance(real, both)
+
+    def _asked(self, thing: object) -> None:
+        """Refuse a question for the type of what another call has left."""
+        if isinstance(thing, Tracer):
+            self.stage.kept.ask([number for number, _ in thing.pieces()])
 
     def _is_number(self, thing: Tracer, kinds: Any) -> bool:
         if thing.is_array:
@@ -195,6 +201,7 @@ class Builtins:
     def _hasattr(self, thing: object, name: str) -> bool:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
+        self._asked(thing)
         kinds = (np.empty(thing.shape),) if thing.is_array else (0.0, np.float64(0.0), 0)
         answers = {hasattr(number, name) for number in kinds}
         if len(answers) > 1:
@@ -202,6 +209,7 @@ class Builtins:
         return answers.pop()
 
     def _type(self, thing: object, *rest: Any) -> Any:
+        self._asked(thing)
         if isinstance(thing, Tracer) and (thing.is_array or thing.is_pythons):
             return np.ndarray if not thing.is_pythons else type(NUMBER_SAMPLES[thing.only.kind][0])
         if isinstance(thing, Tracer) and is_numpys(self.graph, thing):

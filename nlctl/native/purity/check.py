@@ -40,7 +40,6 @@ from .values import (
     Unknown,
     captured,
     element,
-    handed_out_again,
     holder,
     least_upper_bound,
     python_function,
@@ -118,7 +117,7 @@ class FunctionWalk(Walk):
         if isinstance(thing, Bound):
             return self.call(thing.function, thing.given + given)
         if isinstance(thing, Cached):
-            return handed_out_again(self.call(thing.function, given))
+            return self.first_call(thing.function, given)
         if isinstance(thing, Instance):
             return self.call(made.attribute(self, function, "__call__"), given)
         if isinstance(thing, Local):
@@ -152,7 +151,7 @@ class FunctionWalk(Walk):
             result = CallWalker(self, frame).result(node)
             self.walked.discard(node)
             return result
-        key = (node, function, *frame.names.items())
+        key = (node, function, self.caching > 0, *frame.names.items())
         if key not in self.done:
             before = self.keeps
             self.done[key] = OUTSIDE  # while it is being walked: it may call itself

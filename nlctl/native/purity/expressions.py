@@ -40,7 +40,6 @@ from .values import (
     captured,
     element,
     forgotten,
-    handed_out_again,
     holder,
     is_itself_alone,
     least_upper_bound,
@@ -380,13 +379,13 @@ class Expressions(ast.NodeVisitor):
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
-            result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                self.walk.captured(*self.walk.first_result(thing, name))
-                return handed_out_again(result)
+                self.walk.captured(vars(thing), name, getattr(thing, name, None))
+                return self.walk.first_call(captured(getter), Given((base,)))
+            result = self.walk.call(captured(getter), Given((base,)))
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
-            self.walk.captured(type(thing), name, self.walk.unwritten(thing, name, entry))
+            self.walk.captured(type(thing), name, entry)
             return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import SimpleNamespace
+from types import BuiltinFunctionType, MethodWrapperType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from .captured import Captured, held_attributes
 from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__")
+_BOUND = BuiltinFunctionType | MethodWrapperType
 _DEPTH = 3  # of lists in lists, and of objects of libraries, that are searched for arrays
 
 
@@ -80,18 +81,20 @@ def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_
     Within the function that writes them (`is_same`) one list or array is known by its identity.
     """
     by_key = {r.key: r for r in registers} | {(id(r.holder), "__dict__"): r for r in registers}
-    spaces = [r for r in registers if not r.name]
     for note in notes if registers else ():
         if (register := by_key.get((id(note.holder), note.name))) is not None:
             raise refused_register(register, "shares with another function what it writes into")
         whole = note.now
-        for register in spaces:
-            if any(_are_one(register.holder, v, is_same and v is whole) for v in _parts(whole)):
+        for register in by_key.values():
+            if any(_are_one(register, v, is_same and v is whole) for v in _parts(whole)):
                 raise refused_register(register, "knows under another name what it writes into")
 
 
-def _are_one(space: Any, value: Any, is_known: bool) -> bool:
-    """Whether writing one list or array changes another."""
+def _are_one(register: Register, value: Any, is_known: bool) -> bool:
+    """Whether writing a field, a list or an array changes another thing."""
+    space = register.holder
+    if register.name:
+        return value is vars(space)
     if value is space:
         return not is_known
     both = isinstance(value, np.ndarray) and isinstance(space, np.ndarray)
@@ -101,6 +104,10 @@ def _are_one(space: Any, value: Any, is_known: bool) -> bool:
 def _parts(value: Any, depth: int = _DEPTH) -> Iterator[Any]:
     """Yield a value, and what a list or an object of a library holds."""
     yield value
+    if isinstance(value, _BOUND):  # `values.__getitem__`, `array.sum`
+        yield from _parts(value.__self__, depth - 1)
+    if isinstance(value, memoryview):
+        yield value.obj
     if not depth or isinstance(value, (*PLAIN, np.ndarray, type)):
         return
     if isinstance(value, list | tuple | set | frozenset):

@@ -22,6 +22,7 @@ from .values import (
     KnownValue,
     Message,
     captured,
+    handed_out_again,
     least_upper_bound,
     maybe_shared,
     was_there,
@@ -46,6 +47,7 @@ class Walk(ABC):
         self.numba_differs: list[str] = []  # see `FunctionReading`
         self.messages: list[Message] = []
         self.keeps = 0  # how often a list or dict was given something that the call has not made
+        self.caching = 0  # functions around, whose results are handed out again
         self.classes: dict[ast.AST, type] = {}  # by where a function defines them
         self.tuples: set[type] = set()  # named tuples whose properties and operators are walked
         self.objects: list[Instance] = []
@@ -53,11 +55,14 @@ class Walk(ABC):
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
-        if (id(holder), name) in self.registers:
-            return self.registers[id(holder), name][1]
-        if (id(value), "") in self.registers:  # which one it is counts, not what is in it
-            self.read[id(holder), name] = Captured(holder, name, value)
-            return self.registers[id(value), ""][1]
+        is_named = (id(holder), name) in self.registers
+        register = self.registers.get((id(holder), name) if is_named else (id(value), ""))
+        if register is not None:
+            if self.caching:
+                raise refused_register(register[0], "keeps results of a first call, and writes")
+            if not is_named:  # which one it is counts, not what is in it
+                self.read[id(holder), name] = Captured(holder, name, value)
+            return register[1]
         if (id(holder), name) not in self.read:
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
@@ -81,7 +86,7 @@ class Walk(ABC):
         """Note that a field, or elements, are written; return whether they can be."""
         thing, name = register.holder, register.name
         fits = has_plain_fields(thing, name) if name else self._is_read(thing)
-        if not fits or not may_be_kept(value):
+        if self.caching or not fits or not may_be_kept(value):
             return False
         before = getattr(thing, name, 0.0) if name else thing
         if isinstance(before, np.ndarray) and is_workspace(before):  # unknown numbers in a copy
@@ -105,18 +110,12 @@ class Walk(ABC):
             if value.holds and value.inside:
                 self._register(register, maybe_shared(value))
 
-    def first_result(self, thing: Any, name: str) -> tuple[Any, str, Any]:
-        """Return where an object keeps the result of a first call."""
-        return vars(thing), name, self.unwritten(thing, name, getattr(thing, name, None))
-
-    def unwritten(self, thing: object, name: str, value: Any) -> Any:
-        """Return what an object keeps of a first call, unless it is then written into."""
-        for register, _ in self.registers.values():
-            if register.holder is thing and register.name:
-                raise refused_register(
-                    register, f"keeps '{name}' of the first call, and then writes into"
-                )
-        return value
+    def first_call(self, function: KnownValue, given: Given) -> KnownValue:
+        """Return what is known of a result that is handed out again by later calls."""
+        self.caching += 1
+        result = handed_out_again(self.call(function, given))
+        self.caching -= 1
+        return result
 
     def _register(self, register: Register, value: KnownValue) -> None:
         one, known = self.registers.get(register.key, (register, value))

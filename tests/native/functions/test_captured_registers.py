@@ -133,7 +133,13 @@ def remembering_functions():
     """Yield functions whose results depend on the calls before, with what each says of it."""
     c, other, own = Controller(), Controller(), Fields()
     alias = c.work
-    table = {"first": alias}
+    table, mean, bytes_of, fields = {"first": alias}, c.work.mean, memoryview(c.work), vars(own)
+    row = [0.0, 0.0]
+    second = row.__getitem__
+
+    @functools.cache
+    def of_the_first_call():
+        return c.error
 
     def integral(t, x, u, params):
         return x * c.integrate(x[0])
@@ -181,6 +187,46 @@ def remembering_functions():
     def first_property(t, x, u, params):
         c.error = x[0]
         return x * c.first
+
+    def method_of_an_array(t, x, u, params):
+        c.work[:] = x
+        return x * mean()
+
+    def method_of_a_list(t, x, u, params):
+        row[0], row[1] = x
+        return x * second(1)
+
+    def memory(t, x, u, params):
+        c.work[:] = x
+        return x * bytes_of[0]
+
+    def dict_of_an_object(t, x, u, params):
+        own.gain = x[0]
+        return x * fields["gain"]
+
+    def result_of_the_first_call(t, x, u, params):
+        c.error = x[0]
+        return x * of_the_first_call()
+
+    def length(t, x, u, params):
+        count = len(row)
+        row[:] = [x[0]]
+        return x * count
+
+    def truth(t, x, u, params):
+        sign = 1.0 if row else -1.0
+        row[:] = []
+        return x * sign
+
+    def type_of_a_field(t, x, u, params):
+        sign = 1.0 if isinstance(c.integral, float) else -1.0
+        c.integral = 3
+        return x * sign
+
+    def type_of_an_element(t, x, u, params):
+        sign = 1.0 if type(row[0]) is float else -1.0
+        row[0] = row[1] = 3
+        return x * sign
 
     def copied_fields(t, x, u, params):
         own.gain = x[0]
