@@ -86,6 +86,7 @@ def check_pure(
     if registers and not may_write:
         raise refused_register(registers[0], "changes")
     check_apart(registers, walk.read.values(), is_same=True)
+    check_apart(registers, walk.cached, is_same=False)
     return FunctionReading(
         captured=tuple(walk.read.values()), numba_differs=tuple(dict.fromkeys(walk.numba_differs)),
         messages=tuple(walk.messages), registers=registers,

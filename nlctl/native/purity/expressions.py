@@ -77,9 +77,10 @@ class Expressions(ast.NodeVisitor):
     """Walks expressions to what is known of their values; `visit` does so for any node."""
 
     def __init__(self, walk: Walk, frame: Frame) -> None:
-        self.walk, self.frame = walk, frame
+        self.walk, self.frame, self.line = walk, frame, 0
 
     def visit(self, node: ast.AST) -> Any:
+        self.line = getattr(node, "lineno", self.line)
         try:
             return super().visit(node)
         except Impure as error:
@@ -117,18 +118,21 @@ class Expressions(ast.NodeVisitor):
 
     def assign(self, name: str, value: KnownValue) -> None:
         kind = self.frame.shared.get(name)
-        if kind == "global":
-            raise Impure(f"writes the global '{name}'", MEMORY)
         if kind is None:
             self.frame.names[name] = value
             self.frame.unbound.discard(name)
             return
-        frame = self.frame.parent
+        frame = self.frame.parent if kind == "nonlocal" else None
         while frame is not None and name not in frame.names:
             frame = frame.parent
-        if frame is None:
-            raise Impure(f"writes '{name}', a variable of the function around it", MEMORY)
-        frame.names[name] = least_upper_bound([frame.names[name], value])
+        if frame is not None:
+            frame.names[name] = least_upper_bound([frame.names[name], value])
+            return
+        function: Any = self.frame.function
+        around = function.__globals__ if kind == "global" else cells_of(function).get(name)
+        if not self.walk.binds(around, name, value, function, self.line):
+            whose = "the global " if kind == "global" else "of a function around it "
+            raise Impure(f"writes {whose}'{name}'", MEMORY)
 
     def bind(self, target: ast.expr, value: KnownValue) -> None:
         """Assign to a name, an item, an attribute, or several of these."""
@@ -148,9 +152,9 @@ class Expressions(ast.NodeVisitor):
             self.generic_visit(target)
 
     def write(self, target: ast.Subscript | ast.Attribute, value: KnownValue) -> None:
-        base = self.visit(target.value)
+        base, key = self.visit(target.value), FRESH
         if isinstance(target, ast.Subscript):
-            self.visit(target.slice)
+            key = self.visit(target.slice)
         objects = base.known.choices if isinstance(base.known, OneOf) else (base,)
         if all(isinstance(thing.known, Instance) for thing in objects):
             for thing in objects:
@@ -162,7 +166,8 @@ class Expressions(ast.NodeVisitor):
             return
         if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
-        if not base.own and not self.walk.writes(base, target, value, self.frame.function):
+        function = self.frame.function
+        if not base.own and not self.walk.writes(base, target, value, function, key.known):
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
         self.kept(base, [value])

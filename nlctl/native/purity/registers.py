@@ -9,18 +9,18 @@ and nothing that is returned may depend on one.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import BuiltinFunctionType, MethodWrapperType, SimpleNamespace
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping, Sequence, ValuesView
+from types import BuiltinFunctionType, MappingProxyType, MethodWrapperType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ...expressions.registers import REAL_NUMBERS, Register
-from .captured import Captured, held_attributes
+from .captured import GONE, Captured, held_attributes
 from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__")
-_BOUND = BuiltinFunctionType | MethodWrapperType
+_BOUND, _VIEWS = BuiltinFunctionType | MethodWrapperType, KeysView | ItemsView | ValuesView
 _DEPTH = 3  # of lists in lists, and of objects of libraries, that are searched for arrays
 
 
@@ -86,15 +86,27 @@ def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_
             raise refused_register(register, "shares with another function what it writes into")
         whole = note.now
         for register in by_key.values():
-            if any(_are_one(register, v, is_same and v is whole) for v in _parts(whole)):
+            if _is_other_name(register, note) or any(
+                _are_one(register, v, is_same and (v is whole or type(v) is dict))
+                for v in _parts(whole)
+            ):
                 raise refused_register(register, "knows under another name what it writes into")
 
 
+def _is_other_name(register: Register, note: Captured) -> bool:
+    """Whether a value is read from an object whose fields are written as values of a dict."""
+    fields = getattr(note.holder, "__dict__", None)
+    return fields is register.holder and note.name == register.name
+
+
 def _are_one(register: Register, value: Any, is_known: bool) -> bool:
-    """Whether writing a field, a list or an array changes another thing."""
+    """Whether writing a field, a value of a dict, a list or an array changes another thing."""
     space = register.holder
+    if register.name and type(space) is dict:
+        is_view = type(value) is MappingProxyType and value.keys() == space.keys()
+        return is_view or (value is space and (not is_known or "__builtins__" in space))
     if register.name:
-        return value is vars(space)
+        return value is getattr(space, "__dict__", GONE)
     if value is space:
         return not is_known
     both = isinstance(value, np.ndarray) and isinstance(space, np.ndarray)
@@ -108,6 +120,8 @@ def _parts(value: Any, depth: int = _DEPTH) -> Iterator[Any]:
         yield from _parts(value.__self__, depth - 1)
     if isinstance(value, memoryview):
         yield value.obj
+    if isinstance(value, _VIEWS):
+        yield value.mapping
     if not depth or isinstance(value, (*PLAIN, np.ndarray, type)):
         return
     if isinstance(value, list | tuple | set | frozenset):
