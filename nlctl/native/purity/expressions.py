@@ -346,6 +346,8 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
+                if (id(base.known), key) in self.walk.registers:
+                    return self.walk.registers[id(base.known), key][1]
                 missing = getattr(type(base.known), "__missing__", None)
                 if isinstance(missing, FunctionType) and key not in base.known:
                     return self.walk.function(missing, Given((base, captured(key))))

@@ -92,8 +92,8 @@ class Walk(ABC):
         thing, name = register.holder, register.name
         before = held_in(thing, name, GONE) if name else thing
         if type(thing) is dict or isinstance(thing, CellType):
-            is_new = before is GONE and type(thing) is dict  # a key, not a variable
-            fits = is_new or _is_number(before) or is_workspace(before)
+            is_key = type(thing) is dict and "__builtins__" not in thing  # and not a variable
+            fits = is_key or _is_number(before) or is_workspace(before)
         else:
             fits = has_plain_fields(thing, name) if name else self._is_read(thing)
         if self.caching or not fits or not may_be_kept(value):
