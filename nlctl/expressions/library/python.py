@@ -21,6 +21,7 @@ from ..graph import Ambiguous, Expr, Graph, MessageWritten, Namespace, Untraceab
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from ..promoted import is_numpys
+from ..texts import text_of
 from .ordered import extreme, first_ones, sorted_things
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
@@ -93,6 +94,8 @@ class Builtins:
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
         names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
+        names["repr"] = functools.partial(self._text, names["repr"])
+        names["str"] = NumberType(str, functools.partial(self._text, names["str"]))
         names["sorted"] = functools.partial(sorted_things, self.graph)
         names["min"] = functools.partial(self._extreme, "min")
         names["max"] = functools.partial(self._extreme, "max")
@@ -105,6 +108,9 @@ class Builtins:
             return real
         of_numbers = self.stage.for_numbers(real)
         return NumberType(real, of_numbers) if isinstance(real, type) else of_numbers
+
+    def _text(self, of_numbers: Any, *given: Any) -> Any:
+        return text_of(lambda: of_numbers(*given), *((v, "") for v in given))
 
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):
