@@ -30,8 +30,8 @@ class _Gone:
 
 
 GONE = _Gone()
-WRITTEN = object()  # stands for what the function itself writes
-Keys = Iterable[tuple[int, str]]
+_WRITTEN = object()  # stands for what the function itself writes
+_Keys = Iterable[tuple[int, str]]
 _SEQUENCES = (list, tuple, deque, bytearray, array)
 _OF_PARTIALS = ("func", "args", "keywords")
 _TABLES = ("scipy.interpolate", "scipy.spatial.transform", "scipy.sparse", "numpy.polynomial")
@@ -60,7 +60,7 @@ class Captured:
         return f"{name}.{self.name}" if name else self.name
 
 
-def noted(holder: object, name: str, value: object, written: Keys = ()) -> Captured:
+def noted(holder: object, name: str, value: object, written: _Keys = ()) -> Captured:
     """Return the note of a value that has just been read, without what the function writes."""
     return Captured(holder, name, recorded(value, written))
 
@@ -106,13 +106,13 @@ class CapturedValues:
         return None
 
 
-def recorded(value: Any, written: Keys = ()) -> Any:
+def recorded(value: Any, written: _Keys = ()) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if isinstance(value, dict | MappingProxyType):
         held = {k: recorded(v, written) for k, v in value.items()}
-        held |= {k: WRITTEN for of, k in written if of == id(value)}
+        held |= {k: _WRITTEN for of, k in written if of == id(value)}
         return _Kept(type(value), tuple(held.items()))
     if isinstance(value, _SEQUENCES):
         return _Kept(type(value), tuple(recorded(v, written) for v in value))
@@ -209,7 +209,7 @@ def _same_held(now: Any, held: Any) -> bool:
     if isinstance(now, dict | MappingProxyType):
         if not now.keys() <= dict(held).keys():
             return False
-        return all(v is WRITTEN or (k in now and same(now[k], v)) for k, v in held)
+        return all(v is _WRITTEN or (k in now and same(now[k], v)) for k, v in held)
     if isinstance(now, set | frozenset):
         return frozenset(now) == held
     return len(now) == len(held) and all(map(same, now, held))
