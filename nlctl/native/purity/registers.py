@@ -84,11 +84,10 @@ def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_
     for note in notes if registers else ():
         if (register := by_key.get((id(note.holder), note.name))) is not None:
             raise refused_register(register, "shares with another function what it writes into")
-        whole = note.now
+        whole, parts = note.now, list(_parts(note.now))
         for register in by_key.values():
             if _is_other_name(register, note) or any(
-                _are_one(register, v, is_same and (v is whole or type(v) is dict))
-                for v in _parts(whole)
+                _are_one(register, v, is_same and (v is whole or type(v) is dict)) for v in parts
             ):
                 raise refused_register(register, "knows under another name what it writes into")
 
@@ -117,10 +116,10 @@ def _parts(value: Any, depth: int = _DEPTH) -> Iterator[Any]:
     """Yield a value, and what a list or an object of a library holds."""
     yield value
     if isinstance(value, _BOUND):  # `values.__getitem__`, `array.sum`
-        yield from _parts(value.__self__, depth - 1)
+        yield from _parts(value.__self__, max(depth - 1, 0))
     if isinstance(value, memoryview):
         yield value.obj
-    if isinstance(value, _VIEWS):
+    elif isinstance(value, _VIEWS):
         yield value.mapping
     if not depth or isinstance(value, (*PLAIN, np.ndarray, type)):
         return
