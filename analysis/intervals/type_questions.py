@@ -20,8 +20,7 @@ import numpy as np
 import scipy
 
 from nlctl import wording
-from nlctl.expressions.source import codes_in
-from nlctl.native.purity.captured import in_cell
+from nlctl.expressions.source import codes_in, in_cell
 
 _BUILTINS = ("isinstance", "issubclass", "type", "hasattr", "getattr", "setattr", "delattr",
              "vars", "dir", "callable", "repr", "str", "format", "ascii", "bytes", "memoryview",

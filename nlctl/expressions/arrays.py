@@ -236,8 +236,8 @@ class Tracer:
     def _place(self, key: Any) -> range | None:
         """Return where a part of one dimension lies in the origin."""
         whole = self.place if self.origin is not None else range(self.length)
-        is_contiguous = whole is not None and (self.origin is not None or self.axis is not None)
-        is_part = is_contiguous and isinstance(key, slice) and self.ndim == 1
+        is_short = self.origin is self.axis is None
+        is_part = isinstance(key, slice) and self.ndim == 1 and not is_short
         return whole[key] if is_part and whole is not None else None
 
     def _at(self, key: Any) -> Tracer:
@@ -271,8 +271,11 @@ class Tracer:
         return Tracer(self.graph, self.cells.copy(), self.axis, self.length, is_box=self.is_box)
 
     def ravel(self, order: str = "C") -> Tracer:
-        """Return the array in one dimension: a view where NumPy's is one."""
-        return self.reshape(-1, order=order)
+        """Return the array in one dimension: a view where it is contiguous, otherwise a copy."""
+        in_one_piece = self.values.flags["F" if order == "F" else "C"]
+        if self.axis is not None:
+            in_one_piece = self.origin is None or getattr(self.place, "step", 0) == 1
+        return self.reshape(-1, order=order) if in_one_piece else self.flatten(order)
 
     def flatten(self, order: str = "C") -> Tracer:
         """Return a copy in one dimension."""
@@ -476,11 +479,8 @@ def full(graph: Graph, shape: Any, value: object) -> Tracer:
     if len(long) > 1 or len(shape) > 2:
         if np.prod(shape) > _MOST:
             raise Untraceable("a large matrix")
-        cells = np.empty(shape, dtype=object)
-        cells.fill(number.only)
-        return Tracer(graph, cells)
-    cells = np.empty([n for n in shape if n <= graph.small], dtype=object)
-    cells.fill(number.only)
+        return Tracer(graph, np.full(shape, as_array(number.only)))
+    cells = np.full([n for n in shape if n <= graph.small], as_array(number.only))
     return Tracer(graph, cells, *([long[0], shape[long[0]]] if long else []))
 
 

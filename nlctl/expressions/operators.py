@@ -155,7 +155,7 @@ def total(array: Tracer, axis: Any = None) -> Tracer:
     short = [i - (long is not None and i > long) for i in along if i != long]
     for i in sorted(short, reverse=True):
         parts = np.moveaxis(cells, i, 0)
-        cells = as_array(parts[0]) if len(parts) else as_array(graph.const(0.0))
+        cells = as_array(parts[0]).copy() if len(parts) else as_array(graph.const(0.0))
         for part in parts[1:]:
             cells = mapped(lambda a, b: graph.op("add", a, b), cells, as_array(part))
     if long is None or long in along:
@@ -451,6 +451,11 @@ def _of_one(name: str, value: Tracer) -> Tracer:
     return _as_their_result(elementwise(value.graph, name, value.there()), [value])
 
 
+def _positive(value: Tracer) -> Tracer:
+    """Return a copy; of truth values it is the question of ``-value``."""
+    return -value if any(e.kind == "b" for e in value.values.flat) else value.copy()
+
+
 _BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
 for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
     setattr(Tracer, f"__{_name}__", _operator(_op))
@@ -473,7 +478,7 @@ for _name, _method in {
     "rfloordiv": _floor_division_by,
     "divmod": lambda self, other: (self // other, self % other),
     "rdivmod": lambda self, other: (other // self, other % self),
-    "pos": lambda self: self,
+    "pos": _positive,
     **{
         f"{back}{name}shift": _shift(way, bool(back))
         for name, way in (("l", 1), ("r", -1))

@@ -30,10 +30,12 @@ from .operators import elementwise
 from .passes import Passes
 from .promoted import is_numpys
 from .source import Definition, Unreadable, codes_in, definition
+from .texts import filled_in, formatted, text_of
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
+_METHODS = ("index", "sort", "format")  # of lists and texts, of which others are called
 _KEYS, _ASKED_OF = (int, float, bool), {"values": "values", "__class__": "type"}
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
           ast.Attribute, ast.With, ast.JoinedStr, ast.MatchSingleton, ast.MatchClass,
@@ -143,6 +145,13 @@ class _Rewriter(ast.NodeTransformer):
         nothing = ast.arguments([], [], None, [], [], None, [])
         return call_instead("text", ast.Lambda(nothing, node), *pairs)
 
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        """Fill numbers in a text that may stay unwritten."""
+        self.generic_visit(node)
+        form = node.left.value if isinstance(node.left, ast.Constant) else None
+        is_text = isinstance(form, str) and isinstance(node.op, ast.Mod)
+        return call_instead("filled", node.left, node.right) if is_text else node
+
     def visit_Try(self, node: ast.Try) -> Any:
         self.generic_visit(node)
         if any(isinstance(n, _LEAVING) for part in node.finalbody for n in ast.walk(part)):
@@ -184,7 +193,7 @@ class _Rewriter(ast.NodeTransformer):
             node.func = func
         else:
             self.generic_visit(node)
-        if not isinstance(node.func, ast.Attribute) or node.func.attr not in ("index", "sort"):
+        if not isinstance(node.func, ast.Attribute) or node.func.attr not in _METHODS:
             return node
         if node.func.attr == "index" and (len(node.args) != 1 or node.keywords):
             return node
@@ -303,7 +312,9 @@ def names_for(graph: Graph, type_of: Any) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("same"): lambda a, b: _behind(a) is _behind(b),
         INSTEAD_NAME.format("class"): _pattern_type,
         INSTEAD_NAME.format("passes"): lambda: Passes(graph),
-        INSTEAD_NAME.format("text"): _text,
+        INSTEAD_NAME.format("text"): text_of,
+        INSTEAD_NAME.format("format"): formatted,
+        INSTEAD_NAME.format("filled"): filled_in,
         INSTEAD_NAME.format("index"): _index,
         INSTEAD_NAME.format("truth"): functools.partial(_is_truth, graph),
         INSTEAD_NAME.format("nothing"): lambda: NOT_RETURNED,
@@ -313,33 +324,6 @@ def names_for(graph: Graph, type_of: Any) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("sort"): functools.partial(sorted_list, graph),
         INSTEAD_NAME.format("values"): lambda v: v if isinstance(v, Tracer) else v.values,
     }
-
-
-def _text(write: Callable[[], str], *parts: tuple[Any, str]) -> Any:
-    """Return a text, one that says nothing where numbers in it are only known when it runs."""
-    varying = [(v, form) for v, form in parts if isinstance(v, Tracer | _Unwritten)]
-    if not varying:
-        return write()
-    for value, form in varying:
-        if form and (not isinstance(value, Tracer) or value.shape or value.only.kind != "f"):
-            raise Untraceable("a text of what is only known when it runs")
-        format(0.5 if form else "", form)
-    return _Unwritten()
-
-
-class _Unwritten:
-    """A text that may be handed on and thrown away; nothing can be asked of it."""
-
-    @property
-    def __class__(self) -> Any:
-        return str
-
-    def _asked(self, *_: object) -> Any:
-        raise Untraceable("a text of what is only known when it runs")
-
-    __getattr__ = __str__ = __format__ = __hash__ = __eq__ = __len__ = __bool__ = _asked
-    __iter__ = __add__ = __radd__ = __mod__ = __lt__ = __gt__ = __contains__ = _asked
-    __getitem__ = __repr__ = __mul__ = __rmul__ = __le__ = __ge__ = __ne__ = _asked
 
 
 class _Attempt:

@@ -15,7 +15,7 @@ import linecache
 import warnings
 from collections.abc import Iterator
 from types import CellType, CodeType, FunctionType
-from typing import cast
+from typing import Any, cast
 
 Definition = ast.FunctionDef | ast.Lambda
 Places = dict[tuple[str, int], list[Definition]]
@@ -34,6 +34,14 @@ def codes_in(code: CodeType) -> Iterator[CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from codes_in(constant)
+
+
+def in_cell(cell: CellType, empty: object = None) -> Any:
+    """Return what is in the cell of a closure, something else if it is not filled."""
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return empty
 
 
 def cells_of(function: FunctionType) -> dict[str, CellType]:

@@ -39,10 +39,10 @@ from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, boxed, unwrapped
 from .operators import elementwise
-from .registers import Kept
+from .registers import Entries, Kept
 from .rewritten import NumberKeys, followable_code, names_for
 from .roots import roots
-from .source import codes_in, is_dispatcher
+from .source import cells_of, codes_in, in_cell, is_dispatcher
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice, Fraction)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
@@ -61,6 +61,7 @@ class Stage:
         self._copies: dict[int, tuple[Any, Any]] = {}
         self.classes: dict[type, type] = {}
         self._objects: dict[int, tuple[Any, Any]] = {}
+        self._around: dict[int, tuple[Any, Any]] = {}
         self.numpy = staged.StagedModule(np, self._library)
         self.math = staged.StagedModule(math, self._math_function)
         self.cmath = staged.StagedModule(cmath, self._library)
@@ -72,10 +73,11 @@ class Stage:
         if not isinstance(function, FunctionType):
             return self.called_object(function)
         if id(function) not in self._copies:
-            names: dict[str, Any] = {"__builtins__": self._builtins}
-            names["__package__"] = function.__globals__.get("__package__")
+            around: dict[str, Any] = function.__globals__
+            names = self._shared(around, dict)
+            names |= {"__builtins__": self._builtins, "__package__": around.get("__package__")}
             names["__name__"] = function.__module__  # of classes that are defined inside
-            cells = tuple(CellType() for _ in function.__closure__ or ())
+            cells = tuple(self._shared(cell, CellType) for cell in function.__closure__ or ())
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
             is_users = not staged.is_of_a_library(function)
             code = followable_code(function, self.merging) if is_users else function.__code__
@@ -87,11 +89,18 @@ class Stage:
             vars(copy).update({k: self.instead(v) for k, v in vars(function).items()})
             inside = codes_in(function.__code__)
             for name in (name for code in inside for name in code.co_names):
-                if name in function.__globals__:
-                    names[name] = self.instead(function.__globals__[name])
-            for cell, given in zip(cells, function.__closure__ or (), strict=True):
-                cell.cell_contents = self.instead(given.cell_contents)
+                if name in around and name not in names:
+                    value = self.instead(around[name])
+                    names[name] = self.kept.variable(around, name, names, value)
+            for cell, (name, given) in zip(cells, cells_of(function).items(), strict=True):
+                if in_cell(cell, cell) is cell:
+                    value = self.instead(given.cell_contents)
+                    cell.cell_contents = self.kept.variable(given, name, cell, value)
         return self._copies[id(function)][1]
+
+    def _shared(self, thing: Any, make: Callable[[], Any]) -> Any:
+        """Return what stands for a module's names or a cell, the same in all functions there."""
+        return self._around.setdefault(id(thing), (thing, make()))[1]
 
     def called_object(self, thing: object) -> Any:
         """Return what calls a method, a `functools.partial`, or an object."""
@@ -139,13 +148,15 @@ class Stage:
         if isinstance(value, logging.Logger) or value is warnings.warn:
             return staged.Messages(value)
         if value is warnings.simplefilter or value is warnings.filterwarnings:
-            return _without_warnings
+            return staged.without_warnings
         if isinstance(value, type):
             return self._type(value)
         if type(value) in (list, tuple):
             return self.kept.elements(value, lambda v: type(v)(map(self.instead, v)))
         if type(value) in staged.DICTS:
             parts = {k: self.instead(v) for k, v in value.items()}
+            if self.kept.holds(value):
+                return Entries(self.kept, value, parts)
             return NumberKeys(parts) if all(isinstance(k, int | float) for k in parts) else parts
         if isinstance(value, BuiltinFunctionType):
             return self._instead_of_builtin(value)
@@ -184,6 +195,8 @@ class Stage:
 
     def _instead_of_builtin(self, value: Any) -> Any:
         owner, name = getattr(value, "__self__", None), value.__name__
+        if self.kept.holds(owner):
+            raise Untraceable(f"{name}() of what a function writes, under another name")
         if owner is math:
             return getattr(self.math, name)
         if owner is builtins:
@@ -395,13 +408,13 @@ class Stage:
         if cls is np.int64:
             return NumberType(np.int64, self._int64)
         if cls is np.errstate:
-            return _errstate
+            return staged.errstate
         if cls is np.matrix:
             return staged.StagedType(cls, self)
         if cls is contextlib.suppress:
-            return _suppress
+            return staged.suppressed
         if cls is warnings.catch_warnings:
-            return _without_warnings
+            return staged.without_warnings
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -464,23 +477,6 @@ class Stage:
             copied.__set_name__(copied, value.attrname or value.func.__name__)
             return copied
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
-
-
-def _errstate(**how: Any) -> Any:
-    """Return what says how NumPy reports errors, unless it raises or calls something."""
-    if not {"ignore", "warn", None}.issuperset(how.values()):
-        raise Untraceable("NumPy's errors as errors of Python's")
-    return np.errstate(**how)
-
-
-def _without_warnings(*_: object, **__: object) -> Any:
-    """Return a context in which nothing is said about warnings: expressions give none."""
-    return contextlib.nullcontext()
-
-
-def _suppress(*_: object) -> Any:
-    """Refuse what the words of a function do not show."""
-    raise Untraceable("contextlib.suppress under a name that is not global")
 
 
 def _is_column(value: object) -> bool:

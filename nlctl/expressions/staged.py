@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import inspect
@@ -383,3 +384,20 @@ class Ufunc:
 def _base(graph: Graph, value: object) -> Any:
 
     return value if isinstance(value, Special) else traced(graph, value)
+
+
+def errstate(**how: Any) -> Any:
+    """Return what says how NumPy reports errors, unless it raises or calls something."""
+    if not {"ignore", "warn", None}.issuperset(how.values()):
+        raise Untraceable("NumPy's errors as errors of Python's")
+    return np.errstate(**how)
+
+
+def without_warnings(*_: object, **__: object) -> Any:
+    """Return a context in which nothing is said about warnings: expressions give none."""
+    return contextlib.nullcontext()
+
+
+def suppressed(*_: object) -> Any:
+    """Refuse what the words of a function do not show."""
+    raise Untraceable("contextlib.suppress under a name that is not global")

@@ -91,17 +91,20 @@ def _traced(
     graph.limit = len(graph.nodes) + budget
     assumptions, graph.merges = dict(graph.assumptions), merging
     try:
-        stage = Stage(graph, Kept(graph, registers), merging=merging)
+        kept, stages = Kept(graph, registers), list[Stage]()
 
         def run() -> Tracer:
-            stage.kept.begin()
+            kept.begin()
+            if registers or not stages:  # nothing of what another way has written is left
+                stages[:] = [Stage(graph, kept, merging=merging)]
+            stage = stages[0]
             return _flat(graph, stage.copied(function)(*map(stage.instead, arguments())))
 
         result = _followed(graph, run, {}, left)
         if result is None:
             raise Untraceable("it raises an error on every path")
         graph.limit = UNLIMITED
-        stage.kept.check(_numbers([result]))
+        kept.check(_numbers([result]))
         check_slopes(graph, _numbers([result]), _numbers(arguments()))
         return result
     except Ambiguous:

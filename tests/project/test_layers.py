@@ -100,7 +100,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ],
         ["constants"],
         ["indexing"],
-        ["bends", "registers"],
+        ["bends", "registers", "texts"],
         ["library"],
         ["derivatives"],
         ["roots"],

@@ -41,10 +41,9 @@ import control as ct
 import platformdirs
 
 from nlctl.errors import ParameterError
-from nlctl.expressions.source import codes_in
+from nlctl.expressions.source import codes_in, in_cell
 from nlctl.host.files import replace_file
 from nlctl.host.former_name import present_name
-from nlctl.native.purity.captured import in_cell
 
 from ..file.errors import Problem
 from ..file.schema import Study

@@ -81,6 +81,8 @@ def array(
     """Return numbers, lists and arrays as an array of its own, in whatever order of memory."""
     if isinstance(values, PythonNumbers):
         return values.astype(dtype)
+    if not copy and isinstance(values, Tracer) and not ndmin:
+        return asarray(graph, values, dtype)
     if not holds_traced(values):
         result = np.array(values, dtype, ndmin=ndmin)
         if result.dtype != float:
@@ -114,7 +116,15 @@ def _of_floats(graph: Graph, array: Tracer) -> Tracer:
     return Tracer(graph, cells, array.axis, array.length)
 
 
-@of(np.asarray, np.asanyarray, np.ascontiguousarray, np.asarray_chkfinite, makes=True)
+@of(np.ascontiguousarray, makes=True)
+def ascontiguousarray(graph: Graph, values: object, dtype: object = None) -> Any:
+    """Return an array as it is where it is contiguous, otherwise a copy."""
+    array = asarray(graph, values, dtype)
+    is_part = isinstance(array, Tracer) and array is values and array.ndim > 0
+    return array.ravel().reshape(array.shape) if is_part else array
+
+
+@of(np.asarray, np.asanyarray, np.asarray_chkfinite, makes=True)
 def asarray(graph: Graph, values: object, dtype: object = None) -> Any:
     """Return an array as it is, anything else as an array."""
     if isinstance(values, ComplexPair):
@@ -156,6 +166,8 @@ def as_type(graph: Graph, values: Tracer, dtype: object, copy: bool = True) -> T
     if dtype in (int, np.int64, "int"):
         return whole_numbers(graph, values)
     only_floats(dtype)
+    if not copy and all(e.kind == "f" for e in values.values.flat):
+        return values
     return elementwise(graph, "add", values, 0.0).copy()
 
 

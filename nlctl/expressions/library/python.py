@@ -21,6 +21,7 @@ from ..graph import Ambiguous, Expr, Graph, MessageWritten, Namespace, Untraceab
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from ..promoted import is_numpys
+from ..texts import text_of
 from .ordered import extreme, first_ones, sorted_things
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
@@ -93,6 +94,8 @@ class Builtins:
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
         names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
+        names["repr"] = functools.partial(self._text, names["repr"])
+        names["str"] = NumberType(str, functools.partial(self._text, names["str"]))
         names["sorted"] = functools.partial(sorted_things, self.graph)
         names["min"] = functools.partial(self._extreme, "min")
         names["max"] = functools.partial(self._extreme, "max")
@@ -105,6 +108,9 @@ class Builtins:
             return real
         of_numbers = self.stage.for_numbers(real)
         return NumberType(real, of_numbers) if isinstance(real, type) else of_numbers
+
+    def _text(self, of_numbers: Any, *given: Any) -> Any:
+        return text_of(lambda: of_numbers(*given), *((v, "") for v in given))
 
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):
@@ -162,11 +168,17 @@ class Builtins:
         )
         both = (*kinds, *(originals[k] for k in kinds if k in originals))
         if isinstance(thing, Tracer):
+            self._asked(thing)
             return self._is_number(thing, both)
         if callable(thing) and any(k in both for k in (*_FUNCTIONS, np.ufunc)):
             raise Untraceable("the type of a function")
         real = thing.__dict__["_real"] if hasattr(type(thing), "_forwards") else thing
         return isinstance(real, both)
+
+    def _asked(self, thing: object) -> None:
+        """Refuse a question for the type of what another call has left."""
+        if isinstance(thing, Tracer):
+            self.stage.kept.ask([number for number, _ in thing.pieces()])
 
     def _is_number(self, thing: Tracer, kinds: Any) -> bool:
         if thing.is_array:
@@ -195,6 +207,7 @@ class Builtins:
     def _hasattr(self, thing: object, name: str) -> bool:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
+        self._asked(thing)
         kinds = (np.empty(thing.shape),) if thing.is_array else (0.0, np.float64(0.0), 0)
         answers = {hasattr(number, name) for number in kinds}
         if len(answers) > 1:
@@ -202,6 +215,7 @@ class Builtins:
         return answers.pop()
 
     def _type(self, thing: object, *rest: Any) -> Any:
+        self._asked(thing)
         if isinstance(thing, Tracer) and (thing.is_array or thing.is_pythons):
             return np.ndarray if not thing.is_pythons else type(NUMBER_SAMPLES[thing.only.kind][0])
         if isinstance(thing, Tracer) and is_numpys(self.graph, thing):

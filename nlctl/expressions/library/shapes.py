@@ -30,7 +30,7 @@ _MOVING = (
 )  # fmt: skip
 # functions that add and multiply
 _COMPUTING = (
-    np.convolve, np.correlate, np.kron, np.cross, np.einsum, np.trace,
+    np.convolve, np.correlate, np.kron, np.cross, np.trace,
     np.inner, np.vdot, np.tensordot, np.linalg.multi_dot, np.linalg.matrix_power, np.cumsum,
     np.cumprod, np.trapezoid, np.polyval, np.vander, np.polyder, np.polyadd, np.polymul,
     np.polysub, np.ediff1d, np.linalg.cross, np.linalg.outer, np.linalg.trace,
@@ -99,7 +99,17 @@ for _function in _COMPUTING:
     enter([_function], by_numpy(_function))
 
 
-_POLYVAL = by_numpy(np.polyval)
+_POLYVAL, _EINSUM = by_numpy(np.polyval), by_numpy(np.einsum)
+
+
+@of(np.einsum)
+def _einsum(graph: Graph, subscripts: Any, *operands: Any, **options: Any) -> Any:
+    """Return sums of products; of one array without sums a view, as NumPy's is one."""
+    if len(operands) == 1 and isinstance(subscripts, str):
+        sample = np.zeros(traced(graph, operands[0]).shape)
+        if np.shares_memory(np.einsum(subscripts, sample), sample):
+            return by_moving(np.einsum)(graph, subscripts, *operands)
+    return _EINSUM(graph, subscripts, *operands, **options)
 
 
 @of(np.polyval)
@@ -331,7 +341,7 @@ for _name in ("squeeze", "swapaxes", "repeat", "take", "diagonal", "trace", "cum
 
 # what is one expression, of the graph
 _OF_GRAPHS = (
-    ((np.ravel,), lambda graph, values, order='C': traced(graph, values).reshape(-1, order=order)),
+    ((np.ravel,), lambda graph, values, order='C': traced(graph, values).ravel(order)),
     ((np.reshape,),
      lambda graph, values, shape, order='C': traced(graph, values).reshape(shape, order=order)),
     ((np.outer,), lambda graph, a, b:

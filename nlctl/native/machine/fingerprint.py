@@ -24,8 +24,8 @@ import numba
 import numpy as np
 
 from ...annotations import unreported
-from ...expressions.source import codes_in
-from ..purity.captured import held_attributes, in_cell
+from ...expressions.source import codes_in, in_cell
+from ..purity.captured import held_attributes
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
 

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.registers import held_in
 from .values import PLAIN
 
 
@@ -29,6 +30,8 @@ class _Gone:
 
 
 GONE = _Gone()
+_WRITTEN = object()  # stands for what the function itself writes
+_Keys = Iterable[tuple[int, str]]
 _SEQUENCES = (list, tuple, deque, bytearray, array)
 _OF_PARTIALS = ("func", "args", "keywords")
 _TABLES = ("scipy.interpolate", "scipy.spatial.transform", "scipy.sparse", "numpy.polynomial")
@@ -45,11 +48,7 @@ class Captured:
     @property
     def now(self) -> Any:
         """What it is."""
-        if isinstance(self.holder, CellType):
-            return in_cell(self.holder, GONE)
-        if type(self.holder) is dict:
-            return self.holder.get(self.name, GONE)
-        return getattr(self.holder, self.name, GONE)
+        return held_in(self.holder, self.name, GONE)
 
     @property
     def title(self) -> str:
@@ -61,17 +60,9 @@ class Captured:
         return f"{name}.{self.name}" if name else self.name
 
 
-def in_cell(cell: CellType, empty: object = None) -> Any:
-    """Return what is in the cell of a closure, something else if it is not filled."""
-    try:
-        return cell.cell_contents
-    except ValueError:
-        return empty
-
-
-def noted(holder: object, name: str, value: object) -> Captured:
-    """Return the note of a value that has just been read."""
-    return Captured(holder, name, recorded(value))
+def noted(holder: object, name: str, value: object, written: _Keys = ()) -> Captured:
+    """Return the note of a value that has just been read, without what the function writes."""
+    return Captured(holder, name, recorded(value, written))
 
 
 def noted_function(function: FunctionType) -> Iterator[Captured]:
@@ -115,14 +106,16 @@ class CapturedValues:
         return None
 
 
-def recorded(value: Any) -> Any:
+def recorded(value: Any, written: _Keys = ()) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if isinstance(value, dict | MappingProxyType):
-        return _Kept(type(value), tuple((k, recorded(v)) for k, v in value.items()))
+        held = {k: recorded(v, written) for k, v in value.items()}
+        held |= {k: _WRITTEN for of, k in written if of == id(value)}
+        return _Kept(type(value), tuple(held.items()))
     if isinstance(value, _SEQUENCES):
-        return _Kept(type(value), tuple(map(recorded, value)))
+        return _Kept(type(value), tuple(recorded(v, written) for v in value))
     if isinstance(value, set | frozenset):
         return _Kept(type(value), frozenset(value))
     if isinstance(value, np.poly1d) or _is_of_tables(value):
@@ -214,9 +207,9 @@ def same(now: Any, then: Any) -> bool:
 def _same_held(now: Any, held: Any) -> bool:
     """Whether a container holds what it held."""
     if isinstance(now, dict | MappingProxyType):
-        if len(now) != len(held):
+        if not now.keys() <= dict(held).keys():
             return False
-        return all(k in now and same(now[k], v) for k, v in held)
+        return all(v is _WRITTEN or (k in now and same(now[k], v)) for k, v in held)
     if isinstance(now, set | frozenset):
         return frozenset(now) == held
     return len(now) == len(held) and all(map(same, now, held))

@@ -40,7 +40,6 @@ from .values import (
     Unknown,
     captured,
     element,
-    handed_out_again,
     holder,
     least_upper_bound,
     python_function,
@@ -87,6 +86,7 @@ def check_pure(
     if registers and not may_write:
         raise refused_register(registers[0], "changes")
     check_apart(registers, walk.read.values(), is_same=True)
+    check_apart(registers, walk.cached, is_same=False)
     return FunctionReading(
         captured=tuple(walk.read.values()), numba_differs=tuple(dict.fromkeys(walk.numba_differs)),
         messages=tuple(walk.messages), registers=registers,
@@ -118,7 +118,7 @@ class FunctionWalk(Walk):
         if isinstance(thing, Bound):
             return self.call(thing.function, thing.given + given)
         if isinstance(thing, Cached):
-            return handed_out_again(self.call(thing.function, given))
+            return self.first_call(thing.function, given)
         if isinstance(thing, Instance):
             return self.call(made.attribute(self, function, "__call__"), given)
         if isinstance(thing, Local):
@@ -152,7 +152,7 @@ class FunctionWalk(Walk):
             result = CallWalker(self, frame).result(node)
             self.walked.discard(node)
             return result
-        key = (node, function, *frame.names.items())
+        key = (node, function, self.caching > 0, *frame.names.items())
         if key not in self.done:
             before = self.keeps
             self.done[key] = OUTSIDE  # while it is being walked: it may call itself

@@ -40,7 +40,6 @@ from .values import (
     captured,
     element,
     forgotten,
-    handed_out_again,
     holder,
     is_itself_alone,
     least_upper_bound,
@@ -78,9 +77,10 @@ class Expressions(ast.NodeVisitor):
     """Walks expressions to what is known of their values; `visit` does so for any node."""
 
     def __init__(self, walk: Walk, frame: Frame) -> None:
-        self.walk, self.frame = walk, frame
+        self.walk, self.frame, self.line = walk, frame, 0
 
     def visit(self, node: ast.AST) -> Any:
+        self.line = getattr(node, "lineno", self.line)
         try:
             return super().visit(node)
         except Impure as error:
@@ -118,18 +118,21 @@ class Expressions(ast.NodeVisitor):
 
     def assign(self, name: str, value: KnownValue) -> None:
         kind = self.frame.shared.get(name)
-        if kind == "global":
-            raise Impure(f"writes the global '{name}'", MEMORY)
         if kind is None:
             self.frame.names[name] = value
             self.frame.unbound.discard(name)
             return
-        frame = self.frame.parent
+        frame = self.frame.parent if kind == "nonlocal" else None
         while frame is not None and name not in frame.names:
             frame = frame.parent
-        if frame is None:
-            raise Impure(f"writes '{name}', a variable of the function around it", MEMORY)
-        frame.names[name] = least_upper_bound([frame.names[name], value])
+        if frame is not None:
+            frame.names[name] = least_upper_bound([frame.names[name], value])
+            return
+        function: Any = self.frame.function
+        around = function.__globals__ if kind == "global" else cells_of(function).get(name)
+        if not self.walk.binds(around, name, value, function, self.line):
+            whose = "the global " if kind == "global" else "of a function around it "
+            raise Impure(f"writes {whose}'{name}'", MEMORY)
 
     def bind(self, target: ast.expr, value: KnownValue) -> None:
         """Assign to a name, an item, an attribute, or several of these."""
@@ -149,9 +152,9 @@ class Expressions(ast.NodeVisitor):
             self.generic_visit(target)
 
     def write(self, target: ast.Subscript | ast.Attribute, value: KnownValue) -> None:
-        base = self.visit(target.value)
+        base, key = self.visit(target.value), FRESH
         if isinstance(target, ast.Subscript):
-            self.visit(target.slice)
+            key = self.visit(target.slice)
         objects = base.known.choices if isinstance(base.known, OneOf) else (base,)
         if all(isinstance(thing.known, Instance) for thing in objects):
             for thing in objects:
@@ -163,7 +166,8 @@ class Expressions(ast.NodeVisitor):
             return
         if isinstance(base.known, ListOf | OneOf | RowOf | enum.Enum):
             raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
-        if not base.own and not self.walk.writes(base, target, value, self.frame.function):
+        function = self.frame.function
+        if not base.own and not self.walk.writes(base, target, value, function, key.known):
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
         self.kept(base, [value])
@@ -342,6 +346,8 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
+                if (id(base.known), key) in self.walk.registers:
+                    return self.walk.registers[id(base.known), key][1]
                 missing = getattr(type(base.known), "__missing__", None)
                 if isinstance(missing, FunctionType) and key not in base.known:
                     return self.walk.function(missing, Given((base, captured(key))))
@@ -380,13 +386,13 @@ class Expressions(ast.NodeVisitor):
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
-            result = self.walk.call(captured(getter), Given((base,)))
             if isinstance(entry, functools.cached_property):
-                self.walk.captured(*self.walk.first_result(thing, name))
-                return handed_out_again(result)
+                self.walk.captured(vars(thing), name, getattr(thing, name, None))
+                return self.walk.first_call(captured(getter), Given((base,)))
+            result = self.walk.call(captured(getter), Given((base,)))
             return result if not result.own else FRESH
         if isinstance(entry, functools._lru_cache_wrapper):
-            self.walk.captured(type(thing), name, self.walk.unwritten(thing, name, entry))
+            self.walk.captured(type(thing), name, entry)
             return made.of_class(self.walk, base, entry)
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value

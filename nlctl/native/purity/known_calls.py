@@ -47,7 +47,6 @@ from .values import (
     element,
     forgotten,
     function_choice,
-    handed_out_again,
     holder,
     is_builtin,
     least_upper_bound,
@@ -78,7 +77,7 @@ def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
-        return handed_out_again(walk.call(wrapped, given))
+        return walk.first_call(wrapped, given)
     if thing in (np.errstate, warnings.catch_warnings) or (
         isinstance(thing, type) and issubclass(thing, BaseException)
     ):

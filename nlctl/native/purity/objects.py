@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.source import Definition, Unreadable, cells_of, definition
+from ...expressions.source import Definition, Unreadable, cells_of, definition, in_cell
 from ...upstream.numba_internals import CPUDispatcher
-from .captured import in_cell
 
 # what machine code takes as a constant, or can call
 UNDERSTOOD = (

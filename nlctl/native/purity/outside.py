@@ -12,8 +12,7 @@ import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ...expressions.source import cells_of, codes_in
-from .captured import in_cell
+from ...expressions.source import cells_of, codes_in, in_cell
 
 _EVERYTHING = frozenset[str]()
 _MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named

@@ -9,17 +9,18 @@ and nothing that is returned may depend on one.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import SimpleNamespace
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping, Sequence, ValuesView
+from types import BuiltinFunctionType, MappingProxyType, MethodWrapperType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ...expressions.registers import REAL_NUMBERS, Register
-from .captured import Captured, held_attributes
+from .captured import GONE, Captured, held_attributes
 from .values import PLAIN, Impure, KnownValue, OneOf, function_choice, library, was_there
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__")
+_BOUND, _VIEWS = BuiltinFunctionType | MethodWrapperType, KeysView | ItemsView | ValuesView
 _DEPTH = 3  # of lists in lists, and of objects of libraries, that are searched for arrays
 
 
@@ -80,18 +81,31 @@ def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_
     Within the function that writes them (`is_same`) one list or array is known by its identity.
     """
     by_key = {r.key: r for r in registers} | {(id(r.holder), "__dict__"): r for r in registers}
-    spaces = [r for r in registers if not r.name]
     for note in notes if registers else ():
         if (register := by_key.get((id(note.holder), note.name))) is not None:
             raise refused_register(register, "shares with another function what it writes into")
-        whole = note.now
-        for register in spaces:
-            if any(_are_one(register.holder, v, is_same and v is whole) for v in _parts(whole)):
+        whole, parts = note.now, list(_parts(note.now))
+        for register in by_key.values():
+            if _is_other_name(register, note) or any(
+                _are_one(register, v, is_same and (v is whole or type(v) is dict)) for v in parts
+            ):
                 raise refused_register(register, "knows under another name what it writes into")
 
 
-def _are_one(space: Any, value: Any, is_known: bool) -> bool:
-    """Whether writing one list or array changes another."""
+def _is_other_name(register: Register, note: Captured) -> bool:
+    """Whether a value is read from an object whose fields are written as values of a dict."""
+    fields = getattr(note.holder, "__dict__", None)
+    return fields is register.holder and note.name == register.name
+
+
+def _are_one(register: Register, value: Any, is_known: bool) -> bool:
+    """Whether writing a field, a value of a dict, a list or an array changes another thing."""
+    space = register.holder
+    if register.name and type(space) is dict:
+        is_view = type(value) is MappingProxyType and value.keys() == space.keys()
+        return is_view or (value is space and (not is_known or "__builtins__" in space))
+    if register.name:
+        return value is getattr(space, "__dict__", GONE)
     if value is space:
         return not is_known
     both = isinstance(value, np.ndarray) and isinstance(space, np.ndarray)
@@ -101,6 +115,12 @@ def _are_one(space: Any, value: Any, is_known: bool) -> bool:
 def _parts(value: Any, depth: int = _DEPTH) -> Iterator[Any]:
     """Yield a value, and what a list or an object of a library holds."""
     yield value
+    if isinstance(value, _BOUND):  # `values.__getitem__`, `array.sum`
+        yield from _parts(value.__self__, max(depth - 1, 0))
+    if isinstance(value, memoryview):
+        yield value.obj
+    elif isinstance(value, _VIEWS):
+        yield value.mapping
     if not depth or isinstance(value, (*PLAIN, np.ndarray, type)):
         return
     if isinstance(value, list | tuple | set | frozenset):

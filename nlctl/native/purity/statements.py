@@ -127,6 +127,8 @@ class CallWalker(Expressions):
             base, node.target, FRESH, self.frame.function
         ):
             added = least_upper_bound([self.attribute(base, node.target.attr), added])
+        elif type(base.known) is dict and self.visit(node.target).own:
+            pass  # a number, as those are that are written
         elif base.holds and not base.inside:
             text = ast.unparse(node.target.value)
             raise Impure(f"changes an element of '{text}'", f"{MEMORY}, or {CHANGES}")
@@ -146,8 +148,10 @@ class CallWalker(Expressions):
 
     def visit_Delete(self, node: ast.Delete) -> None:
         for target in node.targets:
-            if isinstance(target, ast.Name):
+            if isinstance(target, ast.Name) and target.id not in self.frame.shared:
                 self.assign(target.id, OUTSIDE)
+            elif isinstance(target, ast.Name):
+                raise Impure(f"deletes '{target.id}', a variable around it", MEMORY)
             else:
                 self.bind(target, FRESH)
 

@@ -7,21 +7,22 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from types import FunctionType
+from types import CellType, FunctionType
 from typing import Any
 
 import numpy as np
 
-from ...expressions.registers import Register
+from ...expressions.registers import REAL_NUMBERS, Register, held_in
 from ...expressions.source import source_file
-from .captured import Captured, noted
-from .registers import has_plain_fields, is_workspace, may_be_kept, refused_register
+from .captured import GONE, Captured, noted
+from .registers import has_plain_fields, is_workspace, may_be_kept
 from .values import (
     Given,
     Instance,
     KnownValue,
     Message,
     captured,
+    handed_out_again,
     least_upper_bound,
     maybe_shared,
     was_there,
@@ -46,6 +47,8 @@ class Walk(ABC):
         self.numba_differs: list[str] = []  # see `FunctionReading`
         self.messages: list[Message] = []
         self.keeps = 0  # how often a list or dict was given something that the call has not made
+        self.caching = 0  # functions around, whose results are handed out again
+        self.cached: list[Captured] = []  # what these read
         self.classes: dict[ast.AST, type] = {}  # by where a function defines them
         self.tuples: set[type] = set()  # named tuples whose properties and operators are walked
         self.objects: list[Instance] = []
@@ -53,21 +56,28 @@ class Walk(ABC):
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
+        if self.caching:
+            self.cached.append(Captured(holder, name, value))
         if (id(holder), name) in self.registers:
             return self.registers[id(holder), name][1]
         if (id(value), "") in self.registers:  # which one it is counts, not what is in it
             self.read[id(holder), name] = Captured(holder, name, value)
             return self.registers[id(value), ""][1]
         if (id(holder), name) not in self.read:
-            self.read[id(holder), name] = noted(holder, name, value)
+            self.read[id(holder), name] = noted(holder, name, value, self.registers)
         return captured(value)
 
     def writes(
         self, base: KnownValue, target: ast.Subscript | ast.Attribute, value: KnownValue,
-        function: Callable[..., Any],
+        function: Callable[..., Any], key: Any = None,
     ) -> bool:  # fmt: skip
         """Note that a function writes into what was there before; return whether it may."""
         thing, place = base.known, f"{source_file(function)}, line {target.lineno}"
+        if isinstance(target, ast.Subscript) and type(thing) is dict:
+            keys = [key] if isinstance(key, str) else [k for k, v in thing.items() if _is_number(v)]
+            title, fresh = ast.unparse(target.value), value.own and value.inside
+            registers = [Register(thing, str(k), f"{title}['{k}']", place) for k in keys]
+            return bool(keys) and fresh and all(self._written(r, value) for r in registers)
         if isinstance(target, ast.Subscript):
             return self._written(Register(thing, "", ast.unparse(target.value), place), value)
         setter = inspect.getattr_static(type(thing), target.attr, None)
@@ -80,10 +90,15 @@ class Walk(ABC):
     def _written(self, register: Register, value: KnownValue) -> bool:
         """Note that a field, or elements, are written; return whether they can be."""
         thing, name = register.holder, register.name
-        fits = has_plain_fields(thing, name) if name else self._is_read(thing)
-        if not fits or not may_be_kept(value):
+        before = held_in(thing, name, GONE) if name else thing
+        if type(thing) is dict or isinstance(thing, CellType):
+            is_key = type(thing) is dict and "__builtins__" not in thing  # and not a variable
+            fits = is_key or _is_number(before) or is_workspace(before)
+        else:
+            fits = has_plain_fields(thing, name) if name else self._is_read(thing)
+        if self.caching or not fits or not may_be_kept(value):
             return False
-        before = getattr(thing, name, 0.0) if name else thing
+        before = 0.0 if before is GONE else before
         if isinstance(before, np.ndarray) and is_workspace(before):  # unknown numbers in a copy
             self._register(replace(register, holder=before, name=""), WORKSPACE)
             before = 0.0
@@ -93,6 +108,13 @@ class Walk(ABC):
         elif isinstance(thing, list):
             self._register(register, replace(WORKSPACE, holds=True))
         return True
+
+    def binds(
+        self, holder: object, name: str, value: KnownValue, function: FunctionType, line: int
+    ) -> bool:
+        """Note that a function binds a variable around it; return whether it may."""
+        place = f"{source_file(function)}, line {line}"
+        return self._written(Register(holder, name, name, place), value)
 
     def _is_read(self, thing: object) -> bool:
         """Whether a list or an array of numbers was read from around the function, as it is."""
@@ -105,18 +127,12 @@ class Walk(ABC):
             if value.holds and value.inside:
                 self._register(register, maybe_shared(value))
 
-    def first_result(self, thing: Any, name: str) -> tuple[Any, str, Any]:
-        """Return where an object keeps the result of a first call."""
-        return vars(thing), name, self.unwritten(thing, name, getattr(thing, name, None))
-
-    def unwritten(self, thing: object, name: str, value: Any) -> Any:
-        """Return what an object keeps of a first call, unless it is then written into."""
-        for register, _ in self.registers.values():
-            if register.holder is thing and register.name:
-                raise refused_register(
-                    register, f"keeps '{name}' of the first call, and then writes into"
-                )
-        return value
+    def first_call(self, function: KnownValue, given: Given) -> KnownValue:
+        """Return what is known of a result that is handed out again by later calls."""
+        self.caching += 1
+        result = handed_out_again(self.call(function, given))
+        self.caching -= 1
+        return result
 
     def _register(self, register: Register, value: KnownValue) -> None:
         one, known = self.registers.get(register.key, (register, value))
@@ -141,3 +157,7 @@ class Walk(ABC):
     @abstractmethod
     def function(self, thing: FunctionType, given: Given) -> KnownValue:
         """Return what is known of the result of somebody's Python function."""
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, REAL_NUMBERS)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import control as ct
 import numpy as np
@@ -54,6 +54,18 @@ class Fields:
     gain: float = 1.0
 
 
+LAST, RATES = 0.0, {"first": 0.0, "second": 1.0, "limit": 3.0, "unit": "m"}
+
+
+def last_and(v):
+    return LAST + v
+
+
+def set_last(v):
+    global LAST
+    LAST = 2.0 * v
+
+
 def block(update, name="block", inputs=1):
     """Return a block of two states and one input."""
     return ct.nlsys(update, None, states=2, inputs=inputs, outputs=2, name=name)
@@ -63,6 +75,57 @@ def local_functions():
     """Yield functions whose fields are variables of each call."""
     c, d, bodies, space = Controller(), Controller(), [Controller(), Controller()], Fields()
     names = SimpleNamespace(a=0.0, b=np.zeros(2))
+    table, nested = {"a": 0.0, "b": 1.0, "unit": "m"}, {"inner": {"rate": 0.0}, "gain": 2.0}
+    rate, count, filled = 0.0, 0, {}
+
+    def rate_of(v):
+        nonlocal rate, count
+        count += 1
+        rate = 2.0 * v
+        return rate
+
+    def of_a_dict(t, x, u, params):
+        table["a"] = x[0]
+        table["a"] += 1.0
+        return [table["a"] * table["b"], table.get("a") * len(table["unit"])]
+
+    def by_keys_in_a_loop(t, x, u, params):
+        for key, v in zip(RATES, x, strict=False):
+            if key in ("first", "second"):
+                RATES["first" if key == "first" else "second"] = v
+        return [RATES["first"] - RATES["second"], {**RATES}["first"] + dict(RATES)["second"]]
+
+    def of_dicts_in_dicts(t, x, u, params):
+        nested["inner"]["rate"] = x[0]
+        return [nested["inner"]["rate"] * nested["gain"], x[1]]
+
+    def of_keys_that_are_new(t, x, u, params):
+        filled["first"] = x[0]
+        filled["second"] = [filled["first"], x[1]]
+        filled["second"].append(1.0)
+        return [filled["first"], sum(filled["second"])]
+
+    def of_a_function_around(t, x, u, params):
+        one = rate_of(x[0])
+        return [one + rate, rate_of(x[1]) - rate * one]
+
+    def of_a_module(t, x, u, params):
+        global LAST
+        LAST = x[0]
+        one = last_and(x[1])
+        set_last(one)
+        return [one, LAST]
+
+    def of_a_module_in_ways(t, x, u, params):
+        global LAST
+        LAST = 1.0
+        if x[0] > 0:
+            set_last(x[1])
+        one = LAST
+        for LAST in x:
+            if LAST > 1:
+                break
+        return [one, LAST]
 
     def cached(t, x, u, params):
         return [-c.step(x[0]), c.error * x[1]]
@@ -126,14 +189,22 @@ def local_functions():
             c.error = c.error + v
         return x * c.error
 
-    yield from (v for v in list(locals().values()) if hasattr(v, "__code__"))
+    given = (v for v in list(locals().values()) if hasattr(v, "__code__"))
+    yield from (v for v in given if v.__code__.co_varnames[0] == "t")
 
 
 def remembering_functions():
     """Yield functions whose results depend on the calls before, with what each says of it."""
     c, other, own = Controller(), Controller(), Fields()
     alias = c.work
-    table = {"first": alias}
+    table, mean, bytes_of, fields = {"first": alias}, c.work.mean, memoryview(c.work), vars(own)
+    row, pair, bound, held = [0.0, 0.0], {"a": 0.0, "b": 0.0}, {"a": 0.0}, {"a": 0.0}
+    value_of, proxy, number, filled = bound.get, MappingProxyType(held), 0.0, {}
+    second = row.__getitem__
+
+    @functools.cache
+    def of_the_first_call():
+        return c.error
 
     def integral(t, x, u, params):
         return x * c.integrate(x[0])
@@ -181,6 +252,110 @@ def remembering_functions():
     def first_property(t, x, u, params):
         c.error = x[0]
         return x * c.first
+
+    def method_of_an_array(t, x, u, params):
+        c.work[:] = x
+        return x * mean()
+
+    def method_of_a_list(t, x, u, params):
+        row[0], row[1] = x
+        return x * second(1)
+
+    def memory(t, x, u, params):
+        c.work[:] = x
+        return x * bytes_of[0]
+
+    def dict_of_an_object(t, x, u, params):
+        own.gain = x[0]
+        return x * fields["gain"]
+
+    def result_of_the_first_call(t, x, u, params):
+        c.error = x[0]
+        return x * of_the_first_call()
+
+    def length(t, x, u, params):
+        count = len(row)
+        row[:] = [x[0]]
+        return x * count
+
+    def truth(t, x, u, params):
+        sign = 1.0 if row else -1.0
+        row[:] = []
+        return x * sign
+
+    def type_of_a_field(t, x, u, params):
+        sign = 1.0 if isinstance(c.integral, float) else -1.0
+        c.integral = 3
+        return x * sign
+
+    def type_of_an_element(t, x, u, params):
+        sign = 1.0 if type(row[0]) is float else -1.0
+        row[0] = row[1] = 3
+        return x * sign
+
+    def left_in_the_other_way(t, x, u, params):
+        before = row[0]
+        row[0] = row[1] = x[0]
+        return [1.0, x[1]] if x[1] > 0 else [before, x[1]]
+
+    def key(t, x, u, params):
+        before = pair["a"]
+        pair["a"] = x[0]
+        return x * before
+
+    def key_in_one_branch(t, x, u, params):
+        if x[0] > 0:
+            pair["b"] = x[0]
+        return x * pair["b"]
+
+    def key_that_is_there_later(t, x, u, params):
+        if "first" not in filled:
+            filled["first"] = x[0]
+        return x * filled["first"]
+
+    def number_of_keys(t, x, u, params):
+        count = len({**filled})
+        filled["first"] = x[0]
+        return x * count
+
+    def equal_dicts(t, x, u, params):
+        sign = 1.0 if filled == {} else -1.0
+        filled["first"] = x[0]
+        return x * sign
+
+    def values_of_the_other_call(t, x, u, params):
+        before = sum(pair.values())
+        pair["a"] = pair["b"] = x[0]
+        return x * before
+
+    def method_of_a_dict(t, x, u, params):
+        bound["a"] = x[0]
+        return x * value_of("a")
+
+    def proxy_of_a_dict(t, x, u, params):
+        held["a"] = x[0]
+        return x * proxy["a"]
+
+    def fields_by_keys(t, x, u, params):
+        fields["gain"] = x[0]
+        return x * own.gain
+
+    def variable_around(t, x, u, params):
+        nonlocal number
+        before, number = number, x[0]
+        return x * before
+
+    def variable_of_the_module(t, x, u, params):
+        global LAST
+        if x[0] > 0:
+            LAST = x[0]
+        return x * LAST
+
+    def type_of_a_variable(t, x, u, params):
+        nonlocal number
+        sign = 1.0 if isinstance(number, float) else -1.0
+        number = 3
+        return x * sign
 
     def copied_fields(t, x, u, params):
         own.gain = x[0]

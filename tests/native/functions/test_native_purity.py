@@ -93,7 +93,7 @@ def closed_over():
     def update(t, x, u, params):
         nonlocal step
         step += 1
-        return x
+        return x + step
 
     return update
 
@@ -444,9 +444,10 @@ def test_what_is_a_function_of_its_arguments_is_accepted():
 def test_the_message_names_block_reason_line_and_remedy():
     system = ct.nlsys(IMPURE["closure"], None, inputs=0, outputs=1, states=1, name="counter")
     message = (
-        r"block 'counter' cannot be compiled: its update function writes 'step', a variable of the "
-        r"function around it \(.*test_native_purity.py, line \d+\): keep what it remembers in a "
-        r"state of the block; the diagram still runs in python-control"
+        r"block 'counter' cannot be compiled: its update function remembers 'step' from one call "
+        r"to the next \(.*test_native_purity.py, line \d+\): integrators call it several times a "
+        r"step, in any order: make what it remembers a state of the block, of one with dt= where "
+        r"it is sampled; the diagram still runs in python-control"
     )
     with pytest.raises(CompileError, match=message):
         nlctl.compile(system)

@@ -54,7 +54,7 @@ class Row:
 
 class Noted(Row):
     def __iter__(self):
-        COUNT["n"] += 1
+        COUNT.update(n=COUNT["n"] + 1)
         return iter(self.gains)
 
 

@@ -43,7 +43,7 @@ class Sum:
         return Sum(self.x + other.x)
 
     def __radd__(self, other):
-        COUNT["n"] += 1
+        COUNT.update(n=COUNT["n"] + 1)
         return self
 
     def __neg__(self):
@@ -51,7 +51,7 @@ class Sum:
         return self
 
     def __getitem__(self, i):
-        COUNT["n"] += i
+        COUNT.update(n=COUNT["n"] + i)
         return self.x
 
     @property
