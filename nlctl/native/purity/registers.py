@@ -85,7 +85,7 @@ def check_apart(registers: Sequence[Register], notes: Iterable[Captured], *, is_
         if (register := by_key.get((id(note.holder), note.name))) is not None:
             raise refused_register(register, "shares with another function what it writes into")
         whole, parts = note.now, list(_parts(note.now))
-        for register in by_key.values():
+        for register in registers:
             if _is_other_name(register, note) or any(
                 _are_one(register, v, is_same and (v is whole or type(v) is dict)) for v in parts
             ):
