@@ -6,7 +6,15 @@ function returns depends on such a leaf, each call computes the same, whatever w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import (
+    Callable,
+    ItemsView,
+    Iterable,
+    Iterator,
+    KeysView,
+    Sequence,
+    ValuesView,
+)
 from dataclasses import dataclass
 from types import CellType
 from typing import Any
@@ -153,7 +161,7 @@ class Entries(dict[str, Any]):
         self.kept, self.thing = kept, thing
         self.added = [name for name in written if name not in thing]
 
-    def _ask(self, *_: object) -> None:
+    def _ask(self) -> None:
         if self.added:
             raise Untraceable(f"it adds '{self.added[0]}' to a dict, and asks what is in it")
 
@@ -183,8 +191,8 @@ class Entries(dict[str, Any]):
         return self.copy() != other
 
     def keys(self) -> Any:
-        """Return all keys."""
-        return list(self)
+        """Return all keys: as of a dict, a view of what they are when it is read."""
+        return KeysView(self)
 
     def get(self, key: str, default: object = None) -> Any:
         """Return the value of a key, or a default."""
@@ -192,12 +200,12 @@ class Entries(dict[str, Any]):
         return self[key] if is_there else default
 
     def values(self) -> Any:
-        """Return all values."""
-        return [self[key] for key in self]
+        """Return all values, in a view."""
+        return ValuesView(self)
 
     def items(self) -> Any:
-        """Return all pairs."""
-        return [(key, self[key]) for key in self]
+        """Return all pairs, in a view."""
+        return ItemsView(self)
 
     def copy(self) -> dict[str, Any]:
         """Return a dict of its own."""

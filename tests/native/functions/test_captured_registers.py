@@ -95,6 +95,13 @@ def local_functions():
                 RATES["first" if key == "first" else "second"] = v
         return [RATES["first"] - RATES["second"], {**RATES}["first"] + dict(RATES)["second"]]
 
+    def of_views_of_a_dict(t, x, u, params):
+        RATES["first"], RATES["second"] = x
+        keys, numbers, pairs = RATES.keys(), RATES.values(), RATES.items()
+        RATES["first"] = np.sin(x[1])
+        one, other, *_ = numbers
+        return [one * len(keys), dict(pairs)["first"] + other * ("first" in keys)]
+
     def of_dicts_in_dicts(t, x, u, params):
         nested["inner"]["rate"] = x[0]
         return [nested["inner"]["rate"] * nested["gain"], x[1]]
