@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import control as ct
@@ -10,22 +10,19 @@ import numpy as np
 
 from ..delays.variation import Variation
 from ..errors import ParameterError
-from .along import derivatives
-from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
+from .chattering.detection import new_paces
 from .compiled import Compiled
 from .describe import described_functions
 from .diagram.program import instants_of
 from .discrete import simulate_discrete
-from .happened import happened, with_log
-from .histories import lines_of, variations, with_past, with_room
+from .happened import happened
+from .histories import lines_of, variations, with_past
 from .integrate.log import log_room
-from .integrate.memory import with_fields, with_table
-from .integrate.methods.lu import WHOLE
-from .integrate.methods.stiff import DIFFERENCES, EXACT, stiff_method
+from .integrate.memory import with_table
 from .integrate.methods.tableau import Tableau, pair_of
 from .integrate.methods.taylor import OTHER_METHOD, SLOPES
 from .integrate.samples import Timed
-from .integrate.state import DERIVATIVES, EXPLICIT, METHOD, RUNNING, Status
+from .integrate.state import EXPLICIT, RUNNING, Status
 from .integrate.workspace import Task
 from .integrators import integrators
 from .laid import laid_out, ticks_of
@@ -39,10 +36,10 @@ from .spare import give_back, workspace
 from .taylor.method import with_taylor
 from .taylor.turns import turned, with_turns
 from .timed.ahead import ahead
+from .windows import next_window
 
 _NOTED = 1000  # events of a run for which there is room from the beginning
 _PLACES = 1024  # of a run: as many the reference looks at where a loop is at rest
-ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +114,7 @@ def run_once(
             paces = new_paces(run.lanes)
             while run.lanes["status"][0] == RUNNING:
                 windows = paces["windows"][0]
-                run = differentiated(compiled, watched(run, paces), p)
+                run = next_window(compiled, run, paces, p)
                 run = turned(compiled, run, p, settings)
                 is_over = run.lanes["status"][0] != RUNNING
                 if progress is not None and (is_over or paces["windows"][0] > windows):
@@ -167,65 +164,6 @@ def begin(run: Run) -> None:
     integrators()["start"](rhs, run.task, run.work)
     run.machine.check(run.task.p)
     run.work.samples[0] = run.work.x
-
-
-def go_on(run: Run, rounds: int = ROUNDS) -> Run:
-    """Try up to `rounds` steps in every lane that is still running."""
-    rhs, _ = run.machine.entries
-    point, along = (0, 0) if run.along is None else run.along.entries
-    while rounds:  # what has no room waits until there is: lanes do not shorten others' windows
-        work = with_log(run.task, with_room(run.task, run.work))
-        run = run if work is run.work else replace(run, work=work)
-        run.lanes["untried"] = 0
-        integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
-        run.machine.check(run.task.p)
-        rounds = int(run.lanes["untried"][0])
-    return run
-
-
-def watched(run: Run, paces: np.ndarray) -> Run:
-    """Try a window of steps in every lane; one that chatters at its end gets that status."""
-    # It is the same number of steps whatever lanes are looked at, so that what becomes of one does
-    # not depend on the others.
-    probe = probe_of(run.task)
-    run = go_on(run, ROUNDS - probe)
-    if (run.lanes["status"] >= 0).all():  # all are over
-        return run
-    lanes = asked(run.lanes, paces).nonzero()[0]
-    if not len(lanes):
-        return go_on(run, probe) if RUNNING in run.lanes["status"] else run
-    return _examined(run, [int(j) for j in lanes], probe)
-
-
-def _examined(run: Run, lanes: list[int], probe: int) -> Run:
-    """Try steps one by one, by one method; lanes that chatter there get that status."""
-    task, status, attempts = run.task, run.lanes["status"], []
-    turns = status == METHOD
-    status[turns] = RUNNING
-    run = replace(run, task=with_fields(task, taylor=with_fields(task.taylor, compared=0)))
-    for _ in range(probe):
-        run, attempt = snapshot(run.work, partial(go_on, run, 1))
-        attempts.append(attempt)
-    found = {j: jump_of(run, attempts, j) for j in lanes if status[j] == RUNNING}
-    jumps = {j: jump for j, jump in found.items() if jump is not None}
-    status[turns & (status == RUNNING)] = METHOD
-    status[list(jumps)] = Status.CHATTERING
-    return replace(run, task=task, jumps={**run.jumps, **jumps})
-
-
-def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
-    """Return a run with the derivatives that its stiff method has asked for, if it has."""
-    if run.lanes["status"][0] != DERIVATIVES:
-        return run
-    along, stiff = derivatives(compiled, p), run.task.stiff
-    stiff = stiff_method(
-        run.work.x.shape[0],
-        EXACT if along else DIFFERENCES,
-        along.c if along else stiff.c,
-        along.elimination if along else WHOLE,
-    )
-    run.lanes["status"] = RUNNING
-    return replace(run, task=with_fields(run.task, stiff=stiff), along=along)
 
 
 def finish(run: Run) -> np.ndarray:

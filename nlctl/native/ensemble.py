@@ -43,7 +43,6 @@ from .driver import (
     followed_up,
     prepared,
     trajectory,
-    watched,
     with_events,
 )
 from .ensemble_result import Ensemble, MetricLike, SignalsByName
@@ -55,6 +54,7 @@ from .members import Members, members
 from .results import Trajectory, made
 from .run import Run
 from .settings import settings_of
+from .windows import given_up, watched
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -322,6 +322,7 @@ def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Ru
         paces = new_paces(run.lanes)
         while not stop.is_set() and np.any(run.lanes["status"] == RUNNING):
             run = watched(run, paces)
+            given_up(run, paces)
         return run, finish(run)
 
 

@@ -76,7 +76,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["chattering", "known", "ship"],
         ["run"],
         ["taylor"],
-        ["ahead", "results", "tubes"],
+        ["ahead", "results", "tubes", "windows"],
         ["slid"],
         ["driver", "own_errors"],
         ["ensemble", "response"],

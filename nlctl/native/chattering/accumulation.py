@@ -54,7 +54,7 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     (before, x, _), (after, x_2, u) = points[places[-1] - 1], place
     return Jump(
         times=(before, after), before=x, after=x_2, inputs=u, crowd=crowd,
-        goes_on=bool(rows_that_go_on(evaluated, way)[row]),
+        accumulates=True, goes_on=bool(rows_that_go_on(evaluated, way)[row]),
     )  # fmt: skip
 
 

@@ -52,8 +52,8 @@ _FLAT = 0.25  # part of it by which what does not jump may change
 _BESIDE = 2.0 ** np.arange(4, 22)  # distances between neighbours, any four in a row of which do
 _WAYS = np.random.default_rng(1).choice([-1.0, 1.0], (4, 1000))  # signs, to move a state by
 _PACES = np.dtype(
-    [("t", "f8"), ("longest", "f8")]
-    + [(name, "i8") for name in ("tried", "windows", "slow", "looks")]
+    [(name, "f8") for name in ("t", "longest", "pace")]
+    + [(name, "i8") for name in ("tried", "windows", "slow", "looks", "crawls")]
 )
 
 
@@ -70,7 +70,8 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     # `_LONG` windows on: what usual runs take must not cost them anything, nor what runs take that
     # become slow again and again. A window that a turn to another method cuts short is one together
     # with the next.
-    before, longest, tried, windows, slow, looks = (paces[name] for name in _PACES.names or ())
+    names = ("t", "longest", "tried", "windows", "slow", "looks")
+    before, longest, tried, windows, slow, looks = (paces[name] for name in names)
     status, tried_now = lanes["status"], lanes["accepted"] + lanes["rejected"]
     whole = (tried_now - tried >= WINDOW) & ((status == RUNNING) | (status == METHOD))
     gone = lanes["t"] - before
@@ -83,6 +84,7 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     due[1] &= (slow > 0) & (looks < _LOOKS + windows // _SELDOM)
     looked_at = whole & ((due[0] & (windows >= _LONG)) | due[1])
     looks += looked_at
+    paces["crawls"] = looked_at & (slow > 0)
     return looked_at
 
 

@@ -20,6 +20,7 @@ class Jump:
     after: np.ndarray
     inputs: np.ndarray  # inputs of the program there
     crowd: Crowd | None = None  # how the switches accumulate, if they do
+    accumulates: bool = False  # whether that is all: the run does not stay at this jump
     goes_on: bool = False  # whether each is at another place, see `progress`
     is_rough: bool = False  # whether it jumps with any rounding of the state, see `reference.rough`
 

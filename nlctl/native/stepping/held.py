@@ -11,7 +11,7 @@ from ..audit import Audit, Trial
 from ..audit import audit as compare
 from ..chattering.detection import new_paces
 from ..compiled import Compiled
-from ..driver import ROUNDS, begin, differentiated, go_on, watched
+from ..driver import begin
 from ..happened import happened
 from ..histories import arriving_first
 from ..integrate.state import OK, RUNNING
@@ -20,6 +20,7 @@ from ..results import Trajectory, made
 from ..run import Run
 from ..settings import Settings
 from ..taylor.turns import turned, with_turns
+from ..windows import ROUNDS, differentiated, go_on, next_window
 from .sampled_run import SteppedRun
 from .window import HELD_STEPS, Window, first_window, following, in_full, packed_window, until
 
@@ -100,7 +101,8 @@ class HeldRun(SteppedRun):
             return run
         run = self._turned(go_on(run, ROUNDS))
         while run.lanes["status"][0] == RUNNING:
-            run = self._turned(watched(run, self.paces))
+            run = next_window(self.compiled, run, self.paces, self.p)
+            run = turned(self.compiled, run, self.p, self.settings)
         return run
 
     def arguments(self, run: Run) -> tuple[Any, ...]:

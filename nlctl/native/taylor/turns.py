@@ -111,7 +111,12 @@ def _by_pair(run: Run, settings: Settings) -> Run:
         lane["wait"] = max(2 * lane["wait"], MEASURED)
         lane["span"], lane["stay"] = lane["wait"], _SPAN
     lane["h"] = lane["other_pace"] or lane["h"]  # as it was when the pair was measured
-    for name in ("tries", "seeks", "traces", "returns", "across", "cross", "at_once"):
-        lane[name] = 0  # what was being located is found again
+    locate_anew(lane)
     task = with_fields(run.task, taylor=_COMPARED, pair=pair_of(settings.pair))
     return replace(run, task=task, work=with_stages(run.work, settings.pair.stages))
+
+
+def locate_anew(lane: np.ndarray) -> None:
+    """Have what is being located by one method be found again by another."""
+    for name in ("tries", "seeks", "traces", "returns", "across", "cross", "at_once"):
+        lane[name] = 0

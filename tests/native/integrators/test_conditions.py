@@ -8,10 +8,11 @@ import pytest
 from scipy import signal
 
 import nlctl
-from nlctl.native.driver import Course, begin, finish, go_on, prepared
+from nlctl.native.driver import Course, begin, finish, prepared
 from nlctl.native.integrate.state import RUNNING
 from nlctl.native.results import made as result
 from nlctl.native.settings import Settings
+from nlctl.native.windows import go_on
 
 ROOT2 = np.sqrt(2.0)
 

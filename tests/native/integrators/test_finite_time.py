@@ -6,6 +6,7 @@ import pytest
 from examples import crossed
 
 import nlctl
+from nlctl.native import windows
 
 LAWS = {
     "a tank": lambda t, x, u, p: [-np.sqrt(max(x[0], 0.0))],
@@ -40,3 +41,61 @@ def test_no_polynomial_leads_away_from_rest(law):
     response = run(law, method="taylor")
     exact = np.maximum(1 - response.time / 2, 0) ** 2
     assert np.abs(response.outputs - exact).max() < 1e-6
+
+
+def power_law(a):
+    def law(t, x, u, p):
+        return [-np.sign(x[0]) * abs(x[0]) ** a]
+
+    return law
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("a", [0.3, 1 / 3, 0.5, 0.7])
+def test_a_run_at_rest_does_not_crawl(a, rtol):
+    """x is (1 - (1 - a) t)^(1 / (1 - a)) and then 0, where rates have no bound."""
+    plant = ct.nlsys(power_law(a), inputs=0, outputs=1, states=1, name="plant")
+    timepts = np.linspace(0, 20, 41)
+    response = nlctl.input_output_response(
+        plant, timepts, 0, [1.0], rtol=rtol, atol=0.01 * rtol, max_steps=200_000
+    )
+    exact = np.maximum(1 - (1 - a) * timepts, 0) ** (1 / (1 - a))
+    assert np.abs(response.states - exact).max() < 20 * rtol
+
+
+def test_members_that_crawl_are_what_they_are_alone():
+    law = power_law(1 / 3)
+    plant = ct.nlsys(law, lambda t, x, u, p: x, inputs=0, outputs=["x"], states=1, name="plant")
+    timepts, first = np.linspace(0, 8, 17), np.array([0.25, 1.0, 4.0])
+    how = {"rtol": 1e-7, "atol": 1e-9, "max_steps": 20_000}
+    every = nlctl.ensemble_response(plant, timepts, 0, first[:, None], keep=["x"], **how)
+    for number, x0 in enumerate(first):
+        alone = nlctl.input_output_response(plant, timepts, 0, [x0], **how)
+        assert np.array_equal(every.signals["x"][number], alone.outputs[0])
+
+
+def test_a_trial_that_does_not_pay_leaves_the_run_as_it_was(monkeypatch):
+    def crawling(t, x, u, p):
+        return [x[1], -np.sign(x[1]) * abs(x[1]) ** (1 / 3) - np.sign(x[0]) * abs(x[0]) ** (1 / 5)]
+
+    plant = ct.nlsys(crawling, inputs=0, outputs=2, states=2, name="plant")
+    runs, trials = [], []
+    real = windows._by_stiff_method
+
+    def never(*args):
+        trials.append(real(*args))
+        return trials[-1]
+
+    for replacement in (lambda *_: None, never):
+        monkeypatch.setattr(windows, "_FURTHER", np.inf)
+        monkeypatch.setattr(windows, "_by_stiff_method", replacement)
+        runs.append(
+            nlctl.input_output_response(
+                plant, np.linspace(0, 10, 11), 0, [1.0, 0.0], rtol=1e-5, atol=1e-7,
+                max_steps=20_000, ignore_errors=True,
+            )
+        )  # fmt: skip
+    assert trials
+    assert not any(trials)
+    assert np.array_equal(runs[0].states, runs[1].states)
+    assert runs[0].statistics == runs[1].statistics

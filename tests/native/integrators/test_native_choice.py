@@ -5,9 +5,10 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl.native.driver import Course, begin, differentiated, go_on, prepared
+from nlctl.native.driver import Course, begin, prepared
 from nlctl.native.integrate.state import RUNNING
 from nlctl.native.settings import Settings
+from nlctl.native.windows import differentiated, go_on
 
 ROUNDS = 20  # after so many steps the method is looked at, as it is when methods are compared
 
