@@ -13,6 +13,7 @@ from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, deduce, needed
 
 _SIDES = {"sign": (1.0, -1.0), "heaviside": (1.0, 0.0)}  # values above 0 and below
 _POINTS = 256
+_FAR = 256  # parts that differ on both sides, one made of the other: so far on, it is a jump
 _NEAR = 0.1  # of a parameter
 _SAME = 1e-12
 _ROUNDED = 1e-14  # relative difference of what is equal but for rounding
@@ -39,7 +40,8 @@ class Bending:
         sides = [_on_side(self.graph, tied, one, above) for above in (True, False)]
         pair = (one, other) if one.varies else (other, one)
         try:
-            return self._agree(_Point(self.arrays, tied, pair), sides)
+            with np.errstate(all="ignore"):  # infinite on both sides is not known to agree
+                return self._agree(_Point(self.arrays, tied, pair), sides)
         except Untraceable:
             return False
 
@@ -59,19 +61,19 @@ class Bending:
                 continue
             done.add(node)
             a, b = (point.on_side(node, apart, side, k) for k, side in enumerate(sides))
-            with np.errstate(invalid="ignore"):  # infinite on both sides is not known to agree
-                alike = np.all(abs(_less(a, b)) <= _ROUNDED * (abs(a) + abs(b)))
+            alike = np.all(abs(_less(a, b)) <= _ROUNDED * (abs(a) + abs(b)))
             if alike and node not in point.tied:
                 point.values[node] = a
                 continue
             apart[node] = [a, b]
+            if len(apart) > _FAR:
+                return False
             for reader in self.readers.get(node, ()):
                 heapq.heappush(waiting, reader.index)
-        with np.errstate(invalid="ignore"):
-            return all(
-                np.all(abs(_less(a, b)) <= _SAME * (1 + abs(a) + abs(b)))
-                for a, b in (apart[root] for root in dict.fromkeys(self.roots) if root in apart)
-            )
+        return all(
+            np.all(abs(_less(a, b)) <= _SAME * (1 + abs(a) + abs(b)))
+            for a, b in (apart[root] for root in dict.fromkeys(self.roots) if root in apart)
+        )
 
 
 def _compared(graph: Graph, condition: Expr) -> tuple[Expr, Expr]:
@@ -127,10 +129,9 @@ class _Point:
 
     def of(self, exprs: Sequence[Expr]) -> list[np.ndarray]:
         """Return the values of expressions."""
-        with np.errstate(all="ignore"):
-            for node in parts_first(exprs, self._parts):
-                if node not in self.values:
-                    self.values[node] = self._value(node)
+        for node in parts_first(exprs, self._parts):
+            if node not in self.values:
+                self.values[node] = self._value(node)
         return [self.values[expr] for expr in exprs]
 
     def on_side(
@@ -140,12 +141,13 @@ class _Point:
         """Return the value of an expression on one side, of parts some of which differ there."""
         if node in sides and node.op != "copysign":
             return np.asarray(sides[node])
-        self.of([arg for arg in node.args if arg not in apart])
-        parts = [apart[a][k] if a in apart else self.values[a] for a in node.args]
-        with np.errstate(all="ignore"):
-            if node in sides:
-                return abs(parts[0]) * np.asarray(sides[node])
-            return value_of(node, parts, self.arrays)
+        values = self.values
+        if unknown := [arg for arg in node.args if arg not in values and arg not in apart]:
+            self.of(unknown)
+        parts = [apart[a][k] if a in apart else values[a] for a in node.args]
+        if node in sides:
+            return abs(parts[0]) * np.asarray(sides[node])
+        return value_of(node, parts, self.arrays)
 
     def _parts(self, node: Expr) -> tuple[Expr, ...]:
         return () if node in self.values or self.is_free(node) else node.args
@@ -166,8 +168,7 @@ class _Point:
     def _is_met(self, node: Expr) -> bool:
         """Whether a comparison that parameters decide switches here, too."""
         a, b = self.of(node.args)
-        with np.errstate(invalid="ignore"):
-            return bool(np.all(abs(_less(a, b)) <= _SAME * (abs(a) + abs(b))))
+        return bool(np.all(abs(_less(a, b)) <= _SAME * (abs(a) + abs(b))))
 
     def _moves(self, node: Expr) -> bool:
         """Whether an expression depends on more than parameters."""

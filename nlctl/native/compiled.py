@@ -22,6 +22,7 @@ from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
 from . import floats, jacobians
+from .collected import collected_rarely
 from .derivative_audit import audited_by_parameters, audited_jacobian
 from .describe import called, described
 from .diagram.checks import check_sizes
@@ -335,6 +336,7 @@ def as_compiled(system: System | Compiled, params: Mapping[str, Any] | None = No
 
 
 @as_annotated
+@collected_rarely()
 def compile(  # noqa: A001 (what it does)
     system: System,
     *,

@@ -253,10 +253,14 @@ def _sharp(
         parts = needed([*_pieces([reader.signals[i], rates[i]]), *guards.get(i, [])], given)
         nodes |= dict.fromkeys(part for part in parts if part in moving)
     arguments, rows = [], 0
+    # What a search has chosen moves by that as well, and comes to rest at what it searches for.
+    chosen = {part for part in reader.graph.of_passes if part.op in ORDERS}
     for argument in sharp_arguments(reader.graph, nodes):
-        called = any(part.op == "call" for part in needed([argument.expr]))
-        rows += 0 if called else argument.expr.size or 1
-        if not called and rows <= _MOST:
+        parts = needed([argument.expr])
+        if any(part.op == "call" or part in chosen for part in parts):
+            continue
+        rows += argument.expr.size or 1
+        if rows <= _MOST:
             arguments.append(argument)
     return tuple(arguments)
 

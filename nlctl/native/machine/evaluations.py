@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...sampling.system import Happening
+from ..collected import collected_rarely
 from ..equations.blocks import equations
 from ..lower import Lowered, lower
 from ..reading import Reading
@@ -97,13 +98,22 @@ def machine(
     # Where an integer that steers an equation has another value, the blocks' functions are read
     # once more. The first member's values decide: `fitting` says for which members they hold.
     known = reading.cache.of(Machine)
-    asked = set(happening)
+    asked = tuple(dict.fromkeys(happening))
     for code in known:
-        if code.width == width and asked <= set(code.meetings) and code.lowered.holds_for(p):
+        if code.width == width and set(asked) <= set(code.meetings) and code.lowered.holds_for(p):
             return code
+    known.append(_made(reading, p, width, asked))
+    if len(known) == 1:
+        _hint(reading, known[0])
+    return known[-1]
+
+
+@collected_rarely()
+def _made(reading: Reading, p: np.ndarray, width: int, asked: Iterable[Happening]) -> Machine:
+    """Return machine code that also has functions for all of these happenings."""
     schedule, program = reading.schedule, reading.program
-    extra = [what for what in happening if what not in program.meetings]
-    meetings = (*program.meetings, *dict.fromkeys(extra))
+    extra = [what for what in asked if what not in program.meetings]
+    meetings = (*program.meetings, *extra)
     traced = (
         equations(schedule, program.layout, p[:, 0], meetings)
         if extra
@@ -115,22 +125,10 @@ def machine(
     prepare, rhs, out, *samples = lowered_code(lowered)
     sharp = (samples.pop(),) if "sharp" in lowered.functions else ()
     resets = (samples.pop(),) if program.guards else ()
-    known.append(
-        Machine(
-            width=width,
-            lowered=lowered,
-            prepare=prepare,
-            rhs=rhs,
-            out=out,
-            samples=tuple(samples),
-            resets=resets,
-            sharp=sharp,
-            meetings=meetings,
-        )
-    )
-    if len(known) == 1:
-        _hint(reading, known[0])
-    return known[-1]
+    return Machine(
+        width=width, lowered=lowered, prepare=prepare, rhs=rhs, out=out, samples=tuple(samples),
+        resets=resets, sharp=sharp, meetings=meetings,
+    )  # fmt: skip
 
 
 def _hint(reading: Reading, code: Machine) -> None:

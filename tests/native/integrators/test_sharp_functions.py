@@ -266,3 +266,36 @@ def test_conditions_of_outputs_alone_are_counted():
         inputs=0, outputs=1, states=1, name="shows",
     )  # fmt: skip
     assert "conditions   1 of outputs alone, not located" in str(nlctl.compile(shows))
+
+
+def series(t, x, u, p):
+    """Pulses of height 1, 1 / 2, 1 / 4, ..., each half as wide, until they are low."""
+    total, height, z = 0.0, 1.0, (x[0] - 1.7) / W
+    while height > 0.01:
+        total += height * np.exp(-((z / height) ** 2))
+        height *= 0.5
+    return [1.0, total]
+
+
+def searched(t, x, u, p):
+    """A diode behind a resistor: exp of what a search chooses, which moves as gently as x."""
+    v = brentq(lambda v: 1e-9 * (np.exp(v / 0.026) - 1) - (x[0] - v) / 100, -1.0, 1.0)
+    return [u[0] - x[0], v]
+
+
+def test_pulses_of_a_series_are_seen():
+    plant = ct.nlsys(series, inputs=0, outputs=2, states=2, name="plant")
+    run = nlctl.input_output_response(plant, [0, END], 0, [0.0, 0.0])
+    exact = W * np.sqrt(np.pi) * sum(0.25**k for k in range(7))
+    assert run.states[1, -1] == pytest.approx(exact, rel=1e-5)
+
+
+def test_what_a_search_tries_is_no_function_that_is_measured():
+    plant = ct.nlsys(searched, inputs=1, outputs=2, states=2, name="plant")
+    compiled, t = nlctl.compile(plant), np.linspace(0, 3, 31)
+    assert len(compiled.equations.conditions.sharp) < 8  # of 24 passes
+    run = nlctl.input_output_response(compiled, t, 0.5, [0.3, 0.0], rtol=1e-9, atol=1e-11)
+    reference = ct.input_output_response(
+        plant, t, 0.5 + 0 * t, [0.3, 0.0], solve_ivp_kwargs={"rtol": 1e-9, "atol": 1e-11}
+    )
+    np.testing.assert_allclose(run.states, reference.states, atol=1e-8)
