@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from examples import crossed
+from scipy.optimize import brentq
 
 import nlctl
 from nlctl.native import windows
@@ -99,3 +100,44 @@ def test_a_trial_that_does_not_pay_leaves_the_run_as_it_was(monkeypatch):
     assert not any(trials)
     assert np.array_equal(runs[0].states, runs[1].states)
     assert runs[0].statistics == runs[1].statistics
+
+
+K, C = 1.2, 3.0  # of -K sign(z) sqrt(|z|), and of what pushes z away from rest
+
+
+def pushed(t, x, u, p):
+    return [-K * np.sign(x[0]) * np.sqrt(abs(x[0])) + (C if 4.0 < t < 4.3 else 0.0)]
+
+
+def following(t, x, u, p):
+    z = x[0] - u[0]
+    return [-K * np.sign(z) * np.sqrt(abs(z))]
+
+
+def root_behind(start, timepts):
+    """Return sqrt(|z|) where z has been at rest, is pushed for 0.3 s, and comes to rest again."""
+
+    def took(s):  # the time of dz / dt = C - K sqrt(z) from 0
+        return -2 / K * (s + C / K * np.log1p(-K * s / C)) - min(max(t - start, 0.0), 0.3)
+
+    roots = []
+    for t in timepts:
+        root = brentq(took, 0.0, 0.999 * C / K, xtol=1e-14)
+        roots.append(max(root - K / 2 * max(t - start - 0.3, 0.0), 0.0))
+    return np.array(roots)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("method", [None, "rodas5p"])
+@pytest.mark.parametrize("law", [pushed, following])
+def test_a_push_leads_away_from_rest(law, method, rtol):
+    """At 1e-20 the slope of the law is -6e9: linear equations of a step see z stay there."""
+    plant = ct.nlsys(law, lambda t, x, u, p: x, inputs=1, outputs=1, states=1, name="plant")
+    timepts = np.concatenate([np.linspace(0, 4, 9), [4.1, 4.2, 4.3], np.linspace(4.5, 12, 16)])
+    u = -C * np.clip(timepts - 4.0, 0.0, 0.3)
+    response = nlctl.input_output_response(
+        plant, timepts, u, [1.0], rtol=rtol, atol=0.01 * rtol, method=method, max_steps=60_000
+    )
+    exact = np.where(timepts < 4, np.maximum(1 - K / 2 * timepts, 0), 0) ** 2
+    exact += root_behind(4.0, timepts) ** 2 + (u if law is following else 0.0)
+    assert np.abs(response.states - exact).max() < 30 * rtol

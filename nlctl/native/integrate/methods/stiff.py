@@ -18,6 +18,7 @@ from .lu import Elimination, cost, place
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
 AHEAD = 1e-4  # part of a step by which time is varied
+MOST = 0.5  # of a rate: what differs by more is another one
 SHARE = 0.3  # of the defect at the end of a step: what of it may be an error of the solution
 
 
@@ -42,6 +43,8 @@ class StiffArrays(NamedTuple):
     columns: Reals2  # of 1 / (h gamma) - J, and of its factors
     factors: Reals1
     f_t: Reals1
+    defect: Reals1  # how far rates at the end of a step are from the solution's slope
+    linear: Reals1  # what J makes of a correction of these
     pivots: Places1
     U: Reals2
     t_along: Reals1  # what exact derivatives are evaluated with, a direction in each column
@@ -70,6 +73,8 @@ def new_stiff(n: int, inputs: int) -> StiffArrays:
         columns=np.zeros((n, n)),
         factors=np.zeros(n * n),
         f_t=np.zeros(n),
+        defect=np.zeros(n),
+        linear=np.zeros(n),
         pivots=np.zeros(n, dtype=np.int64),
         U=np.zeros((rodas5p.STAGES, n)),
         t_along=np.zeros(DIRECTIONS),
@@ -178,21 +183,79 @@ def _spectral_radius(task, w):
 
 
 @numba.njit(**INNER)
+def _defect(task, lane, w):
+    """Fill w.stiff.defect with f - x' at the end of a step; return whether x' is another rate."""
+    defect, is_another = w.stiff.defect, False
+    rodas5p.end_slope(lane.step, w.x_flat, w.x_new_flat, w.stiff.U, defect)
+    for i in range(defect.size):
+        defect[i] = w.k[w.k.shape[0] - 1, i, 0] - defect[i]
+        is_another |= _is_apart(task, lane, w, i)
+    return is_another
+
+
+@numba.njit(**INNER)
+def _is_apart(task, lane, w, i):
+    """Whether most of a rate at the end of a step is its defect, and that counts in the step."""
+    size, rate = abs(w.stiff.defect[i]), w.k[w.k.shape[0] - 1, i, 0]
+    if size > MOST * max(abs(rate), abs(rate - w.stiff.defect[i])):
+        return lane.step * size > _tolerance(task, w, i)
+    return False
+
+
+@numba.njit(**INNER)
+def _tolerance(task, w, i):
+    return task.atol + task.rtol * max(abs(w.x[i, 0]), abs(w.x_new[i, 0]))
+
+
+@numba.njit(**INNER)
+def _corrected(rhs, task, lanes, w):
+    """Fill w.ahead with what the new state moved by the correction makes of rates and memories."""
+    ahead = w.ahead
+    for i in range(w.x_stage_flat.size):
+        ahead.x[i, 0] = w.x_new[i, 0] + w.x_stage_flat[i]
+    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
+
+
+@numba.njit(**INNER)
+def _estimate(task, w, only_entries):
+    """Make the correction what the defect leads to, divided by 1 / (h gamma) - J."""
+    for i in range(w.stiff.defect.size):
+        w.x_stage_flat[i] = w.stiff.defect[i]  # that stage is not needed any more
+    lu.solve(task.stiff.elimination, only_entries, w.stiff, w.x_stage_flat)
+
+
+@numba.njit(**INNER)
 def _memory_error(rhs, task, lanes, w, only_entries):
     """Return the largest error of what memories would become, over its tolerance."""
-    # Estimated by the defect f - x' of the solution at the end of the step, divided by 1 / (h
-    # gamma) - J. Most of that is the polynomial's, which is of order 3 in what fast components
-    # amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
-    ahead = w.ahead
-    error = w.x_stage_flat  # not needed any more
-    rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.stiff.U, error)
-    for i in range(error.size):
-        error[i] = w.k[w.k.shape[0] - 1, i, 0] - error[i]
-    lu.solve(task.stiff.elimination, only_entries, w.stiff, error)
-    for i in range(error.size):
-        ahead.x[i, 0] = w.x_new[i, 0] + error[i]
-    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
-    return SHARE * memory_error(task, w.x, w.memories.m, ahead.m, 0)
+    # Most of that is the polynomial's, which is of order 3 in what fast components amplify; less
+    # than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
+    _estimate(task, w, only_entries)
+    _corrected(rhs, task, lanes, w)
+    return SHARE * memory_error(task, w.x, w.memories.m, w.ahead.m, 0)
+
+
+@numba.njit(**INNER)
+def _misled(rhs, task, lanes, w, only_entries):
+    """Return the largest error, over its tolerance, where J says nothing true of a new state."""
+    # At 1e-20 the slope of -sqrt(x) is -5e9. Whatever else pushes, the linear equations of all
+    # stages see x stay there, and so does the estimate of the error. But a tolerance away rates
+    # are not what J says: how far the defect leads is estimated by what they are instead.
+    correction, stiff, largest = w.x_stage_flat, w.stiff, 0.0
+    _estimate(task, w, only_entries)
+    for i in range(correction.size):
+        if _is_apart(task, lanes[0], w, i):
+            least = _tolerance(task, w, i)
+            correction[i] += np.copysign(max(least - abs(correction[i]), 0.0), correction[i])
+    lu.multiply(task.stiff.elimination, stiff.jacobian_flat, correction, stiff.linear)
+    _corrected(rhs, task, lanes, w)
+    for i in range(correction.size):
+        if not _is_apart(task, lanes[0], w, i):
+            continue
+        change = w.ahead.dx[i, 0] - w.k[w.k.shape[0] - 1, i, 0]
+        if abs(change - stiff.linear[i]) > MOST * abs(stiff.linear[i]):
+            slope = 1.0 / (lanes[0].step * rodas5p.GAMMA) + abs(change / correction[i])
+            largest = max(largest, abs(stiff.defect[i]) / slope / _tolerance(task, w, i))
+    return largest
 
 
 @numba.njit(**INNER)
@@ -222,6 +285,9 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
     w.t[0] = lane.t + h
     evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.events.g, w.memories.m)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, stiff.U, task.rtol, task.atol)
+    is_another = _defect(task, lane, w)
+    if is_another and task.fixed == 0.0 and w.error[0] <= 1.0:
+        w.error[0] = max(w.error[0], _misled(rhs, task, lanes, w, only_entries))
     if task.rows.memory.size:
         error = _memory_error(rhs, task, lanes, w, only_entries)
         if not error <= w.error[0]:
