@@ -209,6 +209,7 @@ class Expressions(ast.NodeVisitor):
         return KnownValue(True, True, known=Local(node, self.frame))
 
     def visit_Constant(self, node: ast.Constant) -> KnownValue:
+        self.walk.numba_differs += ["float32"] if node.value in ("float32", "f4") else []
         return captured(node.value) if node.value is not ... else SLICE
 
     def visit_Name(self, node: ast.Name) -> KnownValue:
@@ -340,7 +341,7 @@ class Expressions(ast.NodeVisitor):
         getter = made.operator_of(self.walk, base, "__getitem__")
         if getter is not None:
             return self.walk.function(getter, Given((base, *values[:1])))
-        if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
+        if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown | OneOf):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
             return one_among(element(base), parts)
         if isinstance(base.known, dict | list | tuple):
@@ -420,7 +421,9 @@ class Expressions(ast.NodeVisitor):
             bound = known_calls.method(self.walk, base, node.func.attr, given)
             if bound is not None:
                 if node.func.attr not in known_calls.named.READING:
-                    self.kept(base, given.every)
+                    takes_parts = node.func.attr == "update"
+                    parts = map(element, places) if takes_parts else places
+                    self.kept(base, (*parts, *given.names.values()))
                 return bound
         function = self.visit(node.func)
         given = made.with_field_names(node, function.known, given)

@@ -58,6 +58,7 @@ from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
+_RECORD = "make what it records an output of the block, what it reads again a state"
 DRAW = "draw the values before the run and give them as an input"
 _FILES = "read files before the run, and write them after it"
 _ADVICE = {DRAW: named.DRAWING, MEMORY: named.SETTING, _FILES: named.OF_FILES}
@@ -229,6 +230,9 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given.places)
+    of_tuple = getattr(thing.cls, name, None) if isinstance(thing, Instance) else None
+    if name in ("_replace", "_asdict") and getattr(of_tuple, "__module__", "") == "collections":
+        return KnownValue(True, False, True)
     if isinstance(thing, Pure) and name == "rvs":
         raise Impure("draws random numbers with rvs()", DRAW)
     if isinstance(thing, Pure) and name == "shuffle":
@@ -258,7 +262,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if name in named.VIEWS or name in ("T", "flat"):
         return forgotten(base)
     if name in named.CHANGING:
-        _written(base, f"{name}()")
+        _written(base, f"{name}()", _RECORD if name in named.RECORDING else MEMORY)
         return least_upper_bound([element(base), *given.places[1:2]]) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
@@ -304,9 +308,9 @@ def _check_no_object(base: KnownValue, name: str) -> None:
         raise Impure(f"calls {name}() of what may be an object", "name the object")
 
 
-def _written(base: KnownValue, what: str) -> None:
+def _written(base: KnownValue, what: str, advice: str = MEMORY) -> None:
     if not base.own:
-        raise Impure(f"changes with {what} what it did not make", MEMORY)
+        raise Impure(f"changes with {what} what it did not make", advice)
 
 
 _WITHOUT_CODE = (
@@ -333,7 +337,7 @@ def iterates(walk: Walk, value: KnownValue) -> bool:
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, _WITHOUT_CODE):
+    if isinstance(thing, _WITHOUT_CODE) or type(thing) in HOLDERS:
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
