@@ -102,8 +102,7 @@ class Expressions(ast.NodeVisitor):
                 self.walk.numba_differs += [name] if name in frame.unbound else []
                 return frame.names[name]
             frame = frame.parent
-        function = self.frame.function
-        cells = cells_of(function)
+        function, cells = self.frame.function, cells_of(self.frame.function)
         try:
             if name in cells:
                 return self.walk.captured(cells[name], name, cells[name].cell_contents)
@@ -296,10 +295,9 @@ class Expressions(ast.NodeVisitor):
         return least_upper_bound([self.visit(node.body), self.visit(node.orelse)])
 
     def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> KnownValue:
-        is_row = isinstance(node, ast.Tuple) and not any(
-            isinstance(part, ast.Starred) for part in node.elts
-        )
-        return (row if is_row else holder)([self.visit(part) for part in node.elts])
+        is_open = any(isinstance(part, ast.Starred) for part in node.elts)
+        made_by = row if isinstance(node, ast.Tuple) and not is_open else holder
+        return made_by([self.visit(part) for part in node.elts])
 
     visit_List = visit_Set = visit_Tuple
 
@@ -421,8 +419,7 @@ class Expressions(ast.NodeVisitor):
             bound = known_calls.method(self.walk, base, node.func.attr, given)
             if bound is not None:
                 if node.func.attr not in known_calls.named.READING:
-                    takes_parts = node.func.attr == "update"
-                    parts = map(element, places) if takes_parts else places
+                    parts = map(element, places) if node.func.attr == "update" else places
                     self.kept(base, (*parts, *given.names.values()))
                 return bound
         function = self.visit(node.func)

@@ -296,8 +296,7 @@ def _read(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValu
         known = function_choice([*parts, *given[1:]])
         return replace(least_upper_bound([element(base), *given[1:]]), known=known)
     if isinstance(base.known, dict) and name in ("values", "items"):
-        parts = tuple(getattr(base.known, name)())
-        return KnownValue(True, base.inside, True, known=parts)
+        return KnownValue(True, base.inside, True, known=tuple(getattr(base.known, name)()))
     kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
     return KnownValue(True, base.inside, True) if kept else FRESH
 
