@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from .merged import call_instead
+from .merged import INSTEAD_NAME, call_instead
 
 # methods that change what they are of, functions that change what they are given
 CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
@@ -27,7 +27,7 @@ _NOTICED = CHANGING | WRITERS | IN_PLACE | {
 }  # fmt: skip
 _MAKERS = {"zeros", "ones", "empty", "eye", "full", "identity", "array", "copy", "zeros_like",
            "ones_like", "empty_like", "full_like", "list", "dict", "set", "deque", "arange",
-           "astype"}  # fmt: skip
+           "astype", INSTEAD_NAME.format("writable")}  # fmt: skip
 _DISPLAYS = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp, ast.BinOp,
              ast.Constant, ast.UnaryOp)  # fmt: skip
 _BEGINNING = ("__init__", "__post_init__")

@@ -151,7 +151,7 @@ class _Rewriter(ast.NodeTransformer):
         """Make arrays that are written into take expressions, and integers what they take."""
         self.generic_visit(node)
         named = [t.id for t in node.targets if isinstance(t, ast.Name)]
-        if self.written.intersection(named) and is_new(node.value):
+        if self.written & {*named} and is_new(node.value):
             node.value = call_instead("writable", node.value)
         whole = node.targets[0].value if isinstance(node.targets[0], ast.Subscript) else None
         if isinstance(whole, ast.Name) and len(node.targets) == 1:

@@ -70,6 +70,7 @@ CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | f
               | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
+_OF_TUPLES = [getattr(namedtuple("_", ""), n).__code__ for n in ("_replace", "_asdict")]
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
 
@@ -131,6 +132,8 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return FRESH
     if thing is namedtuple or thing is NamedTuple:
         return made.named_tuple(given)
+    if getattr(thing, "__code__", None) in _OF_TUPLES:
+        return KnownValue(True, False, True)
     if thing is dataclasses.replace and places:
         return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
@@ -230,9 +233,6 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given.places)
-    of_tuple = getattr(thing.cls, name, None) if isinstance(thing, Instance) else None
-    if name in ("_replace", "_asdict") and getattr(of_tuple, "__module__", "") == "collections":
-        return KnownValue(True, False, True)
     if isinstance(thing, Pure) and name == "rvs":
         raise Impure("draws random numbers with rvs()", DRAW)
     if isinstance(thing, Pure) and name == "shuffle":
