@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from .merged import call_instead
+from .merged import INSTEAD_NAME, call_instead
 
 # methods that change what they are of, functions that change what they are given
 CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
@@ -26,7 +26,8 @@ _NOTICED = CHANGING | WRITERS | IN_PLACE | {
     "next", "send", "setattr", "delattr", "__setitem__", "__setattr__", "__delitem__", "__iadd__"
 }  # fmt: skip
 _MAKERS = {"zeros", "ones", "empty", "eye", "full", "identity", "array", "copy", "zeros_like",
-           "ones_like", "empty_like", "full_like", "list", "dict", "set", "deque"}  # fmt: skip
+           "ones_like", "empty_like", "full_like", "list", "dict", "set", "deque", "arange",
+           "astype", INSTEAD_NAME.format("writable")}  # fmt: skip
 _DISPLAYS = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp, ast.BinOp,
              ast.Constant, ast.UnaryOp)  # fmt: skip
 _BEGINNING = ("__init__", "__post_init__")
@@ -155,7 +156,7 @@ def _made_in(nodes: list[ast.AST]) -> set[str]:
     places = set[int]()
     for node in nodes:
         for target, value in _pairs(node):
-            if isinstance(target, ast.Name) and _is_new(value):
+            if isinstance(target, ast.Name) and is_new(value):
                 built.add(target.id)
                 places.add(id(target))
         if isinstance(node, ast.AugAssign):
@@ -180,7 +181,14 @@ def _pairs(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr]]:
             yield target, value
 
 
-def _is_new(value: ast.expr) -> bool:
+def written_names(tree: ast.AST) -> set[str]:
+    """Return the names of what a function writes items into."""
+    items = [n.value for n in ast.walk(tree) if isinstance(n, ast.Subscript)
+             and isinstance(n.ctx, ast.Store)]  # fmt: skip
+    return {whole.id for whole in items if isinstance(whole, ast.Name)}
+
+
+def is_new(value: ast.expr) -> bool:
     """Whether a value is one that nobody else has a name of."""
     if isinstance(value, ast.Call):
         function = value.func

@@ -227,7 +227,8 @@ def _only_computes(function: ast.expr) -> bool:
     """Whether calling a function again changes nothing, by its name."""
     if isinstance(function, ast.Attribute):
         return isinstance(function.value, ast.Name) and function.value.id in ("np", "math")
-    names = ("abs", "min", "max", "float", "int", *map(INSTEAD_NAME.format, ("number", "item")))
+    names = ("abs", "min", "max", "float", "int")
+    names += tuple(map(INSTEAD_NAME.format, ("number", "item", "written")))
     return isinstance(function, ast.Name) and function.id in names
 
 

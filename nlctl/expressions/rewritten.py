@@ -19,10 +19,11 @@ from types import CodeType, FunctionType
 from typing import Any
 
 from .arrays import Tracer, traced
-from .effects import Notices, has_effects
+from .effects import Notices, has_effects, is_new, written_names
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
 from .indexing import item_at
 from .iterated import NOT_RETURNED, Loop, PassWriter
+from .library.creation import writable, written_into
 from .library.ordered import sorted_list
 from .library.table import unwrapped
 from .merged import INSTEAD_NAME, Merger, call_instead, is_none, names_of_choices
@@ -61,7 +62,8 @@ def _rewritten(tree: Any, code: CodeType, _: str, named: Set[Any], merging: bool
     if "__class__" in code.co_freevars:  # only within a class is it what it is
         _check_as_it_is(tree, kinds, merging)
     elif kinds or merging:
-        body = _Rewriter(dict(named)).visit(_as_statements(copy.deepcopy(tree)))
+        body = _as_statements(copy.deepcopy(tree))
+        body = _Rewriter(dict(named), written_names(body)).visit(body)
         body = Notices().visit(Merger().visit(PassWriter().visit(body))) if merging else body
         return _compiled(body, code)
     return code
@@ -113,8 +115,8 @@ def _inside(code: CodeType, name: str) -> CodeType:
 
 
 class _Rewriter(ast.NodeTransformer):
-    def __init__(self, names: Mapping[str, Any]) -> None:
-        self.names = names
+    def __init__(self, names: Mapping[str, Any], written: Set[str]) -> None:
+        self.names, self.written = names, written
         self.classes: list[str] = []  # names of those in patterns
 
     def visit_With(self, node: ast.With) -> Any:
@@ -144,6 +146,17 @@ class _Rewriter(ast.NodeTransformer):
                  for part, form in zip(parts, formats, strict=True)]  # fmt: skip
         nothing = ast.arguments([], [], None, [], [], None, [])
         return call_instead("text", ast.Lambda(nothing, node), *pairs)
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        """Make arrays that are written into take expressions, and integers what they take."""
+        self.generic_visit(node)
+        named = [t.id for t in node.targets if isinstance(t, ast.Name)]
+        if self.written & {*named} and is_new(node.value):
+            node.value = call_instead("writable", node.value)
+        whole = node.targets[0].value if isinstance(node.targets[0], ast.Subscript) else None
+        if isinstance(whole, ast.Name) and len(node.targets) == 1:
+            node.value = call_instead("written", node.value, ast.Name(whole.id, ast.Load()))
+        return node
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """Fill numbers in a text that may stay unwritten."""
@@ -308,6 +321,8 @@ def names_for(graph: Graph, type_of: Any) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
         INSTEAD_NAME.format("item"): functools.partial(item_at, graph),
         INSTEAD_NAME.format("slice"): slice,
+        INSTEAD_NAME.format("writable"): functools.partial(writable, graph),
+        INSTEAD_NAME.format("written"): functools.partial(written_into, graph),
         INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
         INSTEAD_NAME.format("same"): lambda a, b: _behind(a) is _behind(b),
         INSTEAD_NAME.format("class"): _pattern_type,

@@ -188,6 +188,28 @@ def whole_numbers(graph: Graph, values: Tracer) -> Tracer:
     return Tracer(graph, box, values.axis, values.length)
 
 
+def writable(graph: Graph, value: Any) -> Any:
+    """Return numbers in a new array of NumPy's as an array that takes expressions."""
+    numbers = type(value) is np.ndarray and value.dtype in (float, int)
+    return traced(graph, value) if numbers and value.base is None and value.ndim else value
+
+
+def written_into(graph: Graph, value: Any, array: Any) -> Any:
+    """Return a value as an array of integers takes it: without what is behind the point."""
+    if not isinstance(array, Tracer) or {e.kind for e in array.values.flat} != {"i"}:
+        return value
+    value = traced(graph, value)
+    kinds = {e.kind for e in value.values.flat}
+    if kinds == {"i"}:
+        return value
+    if value.size == 1 and value.is_array:
+        raise Untraceable("an array of one float assigned to an array of integers")
+    if not value.shape and kinds == {"f"}:
+        fits = elementwise(graph, "lt", elementwise(graph, "absolute", value), -NO_INTEGER)
+        graph.guard(fits.only, OverflowError)  # of NaN, too
+    return whole_numbers(graph, value)
+
+
 @of(np.ndenumerate)
 def ndenumerate(graph: Graph, values: Any) -> Any:
     """Return pairs of a place and the element there."""

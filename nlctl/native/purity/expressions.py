@@ -102,8 +102,7 @@ class Expressions(ast.NodeVisitor):
                 self.walk.numba_differs += [name] if name in frame.unbound else []
                 return frame.names[name]
             frame = frame.parent
-        function = self.frame.function
-        cells = cells_of(function)
+        function, cells = self.frame.function, cells_of(self.frame.function)
         try:
             if name in cells:
                 return self.walk.captured(cells[name], name, cells[name].cell_contents)
@@ -209,6 +208,7 @@ class Expressions(ast.NodeVisitor):
         return KnownValue(True, True, known=Local(node, self.frame))
 
     def visit_Constant(self, node: ast.Constant) -> KnownValue:
+        self.walk.numba_differs += ["float32"] if node.value in ("float32", "f4") else []
         return captured(node.value) if node.value is not ... else SLICE
 
     def visit_Name(self, node: ast.Name) -> KnownValue:
@@ -295,10 +295,9 @@ class Expressions(ast.NodeVisitor):
         return least_upper_bound([self.visit(node.body), self.visit(node.orelse)])
 
     def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> KnownValue:
-        is_row = isinstance(node, ast.Tuple) and not any(
-            isinstance(part, ast.Starred) for part in node.elts
-        )
-        return (row if is_row else holder)([self.visit(part) for part in node.elts])
+        is_open = any(isinstance(part, ast.Starred) for part in node.elts)
+        made_by = row if isinstance(node, ast.Tuple) and not is_open else holder
+        return made_by([self.visit(part) for part in node.elts])
 
     visit_List = visit_Set = visit_Tuple
 
@@ -340,7 +339,7 @@ class Expressions(ast.NodeVisitor):
         getter = made.operator_of(self.walk, base, "__getitem__")
         if getter is not None:
             return self.walk.function(getter, Given((base, *values[:1])))
-        if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
+        if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown | OneOf):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
             return one_among(element(base), parts)
         if isinstance(base.known, dict | list | tuple):
@@ -420,7 +419,8 @@ class Expressions(ast.NodeVisitor):
             bound = known_calls.method(self.walk, base, node.func.attr, given)
             if bound is not None:
                 if node.func.attr not in known_calls.named.READING:
-                    self.kept(base, given.every)
+                    parts = map(element, places) if node.func.attr == "update" else places
+                    self.kept(base, (*parts, *given.names.values()))
                 return bound
         function = self.visit(node.func)
         given = made.with_field_names(node, function.known, given)

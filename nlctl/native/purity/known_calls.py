@@ -58,6 +58,7 @@ from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
+_RECORD = "make what it records an output of the block, what it reads again a state"
 DRAW = "draw the values before the run and give them as an input"
 _FILES = "read files before the run, and write them after it"
 _ADVICE = {DRAW: named.DRAWING, MEMORY: named.SETTING, _FILES: named.OF_FILES}
@@ -69,6 +70,7 @@ CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | f
               | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
 HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
+_OF_TUPLES = [getattr(namedtuple("_", ""), n).__code__ for n in ("_replace", "_asdict")]
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
 
@@ -130,6 +132,8 @@ def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
         return FRESH
     if thing is namedtuple or thing is NamedTuple:
         return made.named_tuple(given)
+    if getattr(thing, "__code__", None) in _OF_TUPLES:
+        return KnownValue(True, False, True)
     if thing is dataclasses.replace and places:
         return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
@@ -258,7 +262,7 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
     if name in named.VIEWS or name in ("T", "flat"):
         return forgotten(base)
     if name in named.CHANGING:
-        _written(base, f"{name}()")
+        _written(base, f"{name}()", _RECORD if name in named.RECORDING else MEMORY)
         return least_upper_bound([element(base), *given.places[1:2]]) if base.holds else FRESH
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
@@ -292,8 +296,7 @@ def _read(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValu
         known = function_choice([*parts, *given[1:]])
         return replace(least_upper_bound([element(base), *given[1:]]), known=known)
     if isinstance(base.known, dict) and name in ("values", "items"):
-        parts = tuple(getattr(base.known, name)())
-        return KnownValue(True, base.inside, True, known=parts)
+        return KnownValue(True, base.inside, True, known=tuple(getattr(base.known, name)()))
     kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
     return KnownValue(True, base.inside, True) if kept else FRESH
 
@@ -304,9 +307,9 @@ def _check_no_object(base: KnownValue, name: str) -> None:
         raise Impure(f"calls {name}() of what may be an object", "name the object")
 
 
-def _written(base: KnownValue, what: str) -> None:
+def _written(base: KnownValue, what: str, advice: str = MEMORY) -> None:
     if not base.own:
-        raise Impure(f"changes with {what} what it did not make", MEMORY)
+        raise Impure(f"changes with {what} what it did not make", advice)
 
 
 _WITHOUT_CODE = (
@@ -333,7 +336,7 @@ def iterates(walk: Walk, value: KnownValue) -> bool:
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, _WITHOUT_CODE):
+    if isinstance(thing, _WITHOUT_CODE) or type(thing) in HOLDERS:
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:

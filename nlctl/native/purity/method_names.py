@@ -22,6 +22,7 @@ _OF_TEXTS = {"format", "join", "lower", "upper", "startswith", "endswith", "spli
              "removesuffix", "title", "capitalize", "casefold", "swapcase", "zfill", "find",
              "rfind", "isalpha", "isdigit", "isnumeric", "isdecimal", "isalnum", "isspace",
              "isupper", "islower", "isidentifier", "ljust", "rjust"}  # fmt: skip
+RECORDING = {"append", "extend", "appendleft", "add", "insert", "setdefault"}  # in histories
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
            "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",

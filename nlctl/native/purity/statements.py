@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import ast
 import contextlib
+import functools
 import importlib
 import sys
 import warnings
@@ -35,6 +36,7 @@ from .values import (
     holder,
     least_upper_bound,
     library,
+    was_there,
 )
 from .walk import Walk
 
@@ -194,7 +196,24 @@ class CallWalker(Expressions):
     def visit_For(self, node: ast.For) -> None:
         over = self.visit(node.iter)
         self.iterated(over)
-        self.repeated(node, lambda: self.bind(node.target, element(over)))
+        for part in self.texts_in(node.iter, over.known) or [element(over)]:
+            self.repeated(node, functools.partial(self.bind, node.target, part))
+
+    def texts_in(self, node: ast.expr, known: object) -> list[KnownValue]:
+        """Return each of the texts that a loop goes through: attributes and keys by names."""
+        parts = [self.visit(p) for p in node.elts] if isinstance(node, ast.Tuple | ast.List) else []
+        parts = list(map(captured, known)) if isinstance(known, tuple) else parts
+        return parts if all(isinstance(part.known, str) for part in parts) else []
+
+    def visit_Call(self, node: ast.Call) -> KnownValue:
+        """Write as a statement does what setattr() names, of what was there before."""
+        is_setter = len(node.args) == 3 and self.visit(node.func).known is setattr
+        name = self.visit(node.args[1]).known if is_setter else None
+        if not isinstance(name, str) or not was_there(self.visit(node.args[0]).known):
+            return super().visit_Call(node)
+        target = ast.Attribute(node.args[0], name, ast.Store())
+        self.write(ast.copy_location(target, node), self.visit(node.args[2]))
+        return FRESH
 
     def visit_While(self, node: ast.While) -> None:
         self.repeated(node, lambda: self.condition(node.test))

@@ -56,6 +56,9 @@ class Walk(ABC):
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
+        of_numpy = isinstance(value, np.ndarray | np.generic)
+        if value is np.float32 or (of_numpy and value.dtype == np.float32):
+            self.numba_differs.append("float32")  # numba has doubles of it sooner than NumPy
         if self.caching:
             self.cached.append(Captured(holder, name, value))
         if (id(holder), name) in self.registers:

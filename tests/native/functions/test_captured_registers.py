@@ -447,3 +447,33 @@ def test_what_others_write_into_the_fields_changes_nothing():
     again = nlctl.input_output_response(compiled, times, 0.0, [0.5, -0.2])
     np.testing.assert_array_equal(again.states, run.states)
     np.testing.assert_allclose(run.states, reference.states, atol=1e-5)
+
+
+FIELDS = ("gain", "rate")
+
+
+def test_attributes_that_a_loop_names_are_fields():
+    """By names in brackets, or in a tuple around the function; also those of a dict."""
+    one = SimpleNamespace(gain=1.0, rate=2.0, offset=0.5, work=np.zeros(2))
+
+    def update(t, x, u, params):
+        for name in FIELDS:
+            setattr(one, name, params.get(name, 1.0) * x[0])
+        for name in ["work"]:
+            setattr(one, name, 2.0 * x)
+        return one.gain * one.work - one.rate * x + one.offset
+
+    def remembers(t, x, u, params):
+        for name in FIELDS:
+            setattr(one, name, getattr(one, name) + x[0])
+        return -one.gain * x
+
+    system = ct.nlsys(update, None, states=2, inputs=0, outputs=2, params={"rate": 3.0}, name="a")
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    for x in np.random.default_rng(0).normal(size=(5, 2)):
+        want = 2.0 * x[0] * x - 3.0 * x[0] * x + 0.5
+        np.testing.assert_allclose(system.dynamics(0.0, x, []), want, rtol=1e-12)
+        np.testing.assert_allclose(compiled.dynamics(0.0, x), want, rtol=1e-12)
+    with pytest.raises(CompileError, match=r"remembers 'one\.gain'"):
+        nlctl.compile(block(remembers))

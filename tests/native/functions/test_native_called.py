@@ -347,3 +347,27 @@ def test_what_named_tuples_mean_in_other_machine_code_stays_as_it_is():
         numba.njit(lambda r: r["k"])(reading)
     with pytest.raises(NumbaError):  # numba compares no text with numbers; never: a field's name
         numba.njit(lambda r: "k" in r)(reading)
+
+
+TABLE = np.linspace(0.0, 1.0, 7, dtype=np.float32) ** 2
+
+
+def of_single_precision(t, x, u, params):
+    return np.array([x[1], 0.01 * TABLE[int(abs(x[0]))] - x[1] * TABLE[2]])
+
+
+def cast_to_single_precision(t, x, u, params):
+    angle, rate = x.astype("float32")
+    return np.array([rate, 0.8 - 1.2 * np.sin(angle) - 0.1 * rate])
+
+
+@pytest.mark.filterwarnings("ignore::nlctl.errors.EngineWarning")
+@pytest.mark.parametrize("update", [of_single_precision, cast_to_single_precision])
+def test_single_precision_is_that_of_numpy(update):
+    """numba has doubles of it sooner: 0.01 times a single is none in NumPy."""
+    system = ct.nlsys(update, None, states=2, inputs=0, outputs=2, name="block")
+    compiled = nlctl.compile(system)
+    (call,) = compiled.equations.calls.values()
+    assert call.system is None  # not for numba
+    for x in np.random.default_rng(2).normal(size=(9, 2)):
+        assert (compiled.dynamics(0.0, x, []) == system.dynamics(0.0, x, [])).all()

@@ -112,3 +112,40 @@ def test_plain_ones_are_traced():
     compiled = nlctl.compile(decay(lambda x: -Plain2(x[0]).product * 0.5))
     assert "Jacobian     exact" in str(compiled)
     assert end(compiled) == pytest.approx(np.exp(-1), rel=1e-5)
+
+
+class Moving(NamedTuple):
+    """A state that makes the next of itself."""
+
+    a: float
+    b: float = 0.0
+
+    def rate(self, force):
+        return self._replace(a=self.b, b=force - self.a).halved()
+
+    def halved(self):
+        return Moving(*(v / 2 for v in self._asdict().values()))
+
+
+class Recording(Moving):
+    def _replace(self, **new):
+        SEEN.append(new)
+        return super()._replace(**new)
+
+
+def test_a_method_makes_another_by_replacing_fields():
+    system = ct.nlsys(lambda t, x, u, params: list(Moving(*x).rate(np.tanh(x[1]))), None,
+                      states=2, inputs=0, outputs=2, name="block")  # fmt: skip
+    compiled = nlctl.compile(system)
+    assert not compiled.equations.calls
+    for x in ([0.3, -2.0], [1.0, 0.5]):
+        want = [x[1] / 2, (np.tanh(x[1]) - x[0]) / 2]
+        np.testing.assert_allclose(system.dynamics(0, np.array(x), []), want, rtol=1e-14)
+        np.testing.assert_allclose(compiled.dynamics(0, x, []), want, rtol=1e-12)
+
+
+def test_what_an_heir_replaces_is_walked():
+    system = ct.nlsys(lambda t, x, u, params: list(Recording(*x).rate(1.0)), None,
+                      states=2, inputs=0, outputs=2, name="block")  # fmt: skip
+    with pytest.raises(CompileError):
+        nlctl.compile(system)

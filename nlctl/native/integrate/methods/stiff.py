@@ -18,7 +18,7 @@ from .lu import Elimination, cost, place
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
 AHEAD = 1e-4  # part of a step by which time is varied
-MOST = 0.5  # of a rate: what differs by more is another one
+ANOTHER = 0.5  # part of a rate: what differs by more is another one
 SHARE = 0.3  # of the defect at the end of a step: what of it may be an error of the solution
 
 
@@ -197,7 +197,7 @@ def _defect(task, lane, w):
 def _is_apart(task, lane, w, i):
     """Whether most of a rate at the end of a step is its defect, and that counts in the step."""
     size, rate = abs(w.stiff.defect[i]), w.k[w.k.shape[0] - 1, i, 0]
-    if size > MOST * max(abs(rate), abs(rate - w.stiff.defect[i])):
+    if size > ANOTHER * max(abs(rate), abs(rate - w.stiff.defect[i])):
         return lane.step * size > _tolerance(task, w, i)
     return False
 
@@ -252,7 +252,7 @@ def _misled(rhs, task, lanes, w, only_entries):
         if not _is_apart(task, lanes[0], w, i):
             continue
         change = w.ahead.dx[i, 0] - w.k[w.k.shape[0] - 1, i, 0]
-        if abs(change - stiff.linear[i]) > MOST * abs(stiff.linear[i]):
+        if abs(change - stiff.linear[i]) > ANOTHER * abs(stiff.linear[i]):
             slope = 1.0 / (lanes[0].step * rodas5p.GAMMA) + abs(change / correction[i])
             largest = max(largest, abs(stiff.defect[i]) / slope / _tolerance(task, w, i))
     return largest
