@@ -141,3 +141,43 @@ def test_a_push_leads_away_from_rest(law, method, rtol):
     exact = np.where(timepts < 4, np.maximum(1 - K / 2 * timepts, 0), 0) ** 2
     exact += root_behind(4.0, timepts) ** 2 + (u if law is following else 0.0)
     assert np.abs(response.states - exact).max() < 30 * rtol
+
+
+LAYERS = {
+    "clip": lambda z: np.clip(z, -1, 1),
+    "tanh": np.tanh,
+    "fraction": lambda z: z / (1 + abs(z)),
+}
+NARROW = [("clip", 1e-10, None), ("clip", 1e-12, None), ("clip", 1e-6, "rodas5p")]
+NARROW += [("tanh", 1e-8, "rodas5p"), ("fraction", 1e-8, "rodas5p"), ("fraction", 1e-10, "rodas5p")]
+
+
+@pytest.mark.parametrize(("name", "width", "method"), NARROW)
+@pytest.mark.parametrize("pushed_by", ["a pulse", "a ramp"])
+def test_a_push_leads_out_of_a_narrow_layer(name, width, method, pushed_by):
+    """With as good as a relay: x' is the push, less 1, where x is above the layer."""
+    shape = LAYERS[name]
+
+    def law(t, x, u, p):
+        return [-shape(x[0] / width) + u[0]]
+
+    def pulse(t, x, u, p):
+        return [-shape(x[0] / width) + (3.0 if 4.0 < t < 4.3 else 0.0)]
+
+    is_ramp = pushed_by == "a ramp"  # of 3 in 0.1 s: it is 1 a third of that behind 4 s
+    plant = ct.nlsys(law if is_ramp else pulse, inputs=1, outputs=1, states=1, name="plant")
+    timepts = np.linspace(0, 8, 81)
+    push = np.interp(timepts, [4, 4.1, 4.2, 4.3], [0, 3, 3, 0])
+    response = nlctl.input_output_response(
+        plant, timepts, push, [1e-3], rtol=1e-7, atol=1e-9, method=method, max_steps=100_000
+    )
+    behind = timepts - 4.0
+    if is_ramp:
+        rising = 15 * np.maximum(np.minimum(behind, 0.1) - 1 / 30, 0) ** 2
+        held = 2 * np.clip(behind - 0.1, 0, 0.1)
+        s = np.clip(behind - 0.2, 0, 0.1)
+        exact = rising + held + 2 * s - 15 * s**2 - np.maximum(behind - 0.3, 0)
+    else:
+        exact = 2 * np.clip(behind, 0, 0.3) - np.maximum(behind - 0.3, 0)
+    wrong = np.abs(response.states[0] - np.maximum(exact, 0))[1:]
+    assert wrong.max() < 1e-5 + 100 * width * (1 if name != "fraction" else 30)

@@ -22,7 +22,7 @@ from ..methods.dense import events_at_parts
 from ..methods.quartic import doubt, least_value, parabola, quartic, slope_at
 from ..restart import AHEAD
 from ..state import INNER, is_stiff
-from .location import AGAIN, STARTS_BEHIND, is_kink
+from .location import AGAIN, STARTS_BEHIND, goes_over_kinks, is_kink
 
 _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in a step
 _HOPELESS = 0.6  # part of a step in which a smooth function can be followed, after one or two such
@@ -95,7 +95,7 @@ def _known(task, lane, w, i, j, row):
     # Of `f`, which is above 0 at both ends of the step: sign times the function plus offset.
     inside, at = w.inside, task.pair.inside[row]
     values = inside.values
-    if lane.dull and is_kink(task, i):
+    if is_kink(task, i) and goes_over_kinks(task, lane):
         return _CLEAR, 0.0
     sign, offset = _side(w, i, j)
     values[0] = sign * w.events.g_start[i, j] + offset

@@ -37,6 +37,12 @@ def is_kink(task, i):
 
 
 @numba.njit(**INNER)
+def goes_over_kinks(task, lane):
+    """Whether kinks are left to error control, for a while: a polynomial sees one side only."""
+    return lane.dull > 0 and task.taylor.highest == 0
+
+
+@numba.njit(**INNER)
 def triggered(start, end, behind):
     """Whether a switching function's values at the ends of a step show an event in between."""
     # With `behind` its own event was the end of the step before: on a surface that attracts from
@@ -64,7 +70,9 @@ def first_root(lane, task, every, w, low, high, j):
     first, rows, small = -1.0, task.rows, SMALL_KINK * task.atol
     start, behind = w.events.g_start, w.events.behind
     for i in range(rows.switching if every else rows.declared):
-        if is_kink(task, i) and (lane.dull or abs(start[i, j]) + abs(high[i, j]) <= small):
+        if is_kink(task, i) and (
+            goes_over_kinks(task, lane) or abs(start[i, j]) + abs(high[i, j]) <= small
+        ):
             continue  # rounding of what is 0: a kink that small is seen by nobody
         if triggered(start[i, j], high[i, j], behind[i, j] != 0.0):
             root = _root(lane, low[i, j], high[i, j])
