@@ -181,3 +181,26 @@ def test_a_push_leads_out_of_a_narrow_layer(name, width, method, pushed_by):
         exact = 2 * np.clip(behind, 0, 0.3) - np.maximum(behind - 0.3, 0)
     wrong = np.abs(response.states[0] - np.maximum(exact, 0))[1:]
     assert wrong.max() < 1e-5 + 100 * width * (1 if name != "fraction" else 30)
+
+
+def both(t, x, u, p):
+    z = x[0] - u[0]
+    return [-K * np.sign(z) * np.sqrt(abs(z)) + (C if 4.0 < t < 4.3 else 0.0)]
+
+
+@pytest.mark.parametrize("ramp", [2.9, 3.05, 3.3, 4.0, 6.0])
+@pytest.mark.parametrize("method", [None, "rodas5p"])
+def test_a_push_is_seen_that_a_ramp_nearly_takes_back(method, ramp):
+    """z' = C - ramp - K sign(z) sqrt(|z|) from 0, in a closed form."""
+    plant = ct.nlsys(both, lambda t, x, u, p: x, inputs=1, outputs=1, states=1, name="plant")
+    timepts = np.concatenate([np.linspace(0, 4, 9), [4.1, 4.2, 4.3, 5.0]])
+    u = ramp * np.clip(timepts - 4.0, 0.0, 0.3)
+    response = nlctl.input_output_response(
+        plant, timepts, u, [1.0], rtol=1e-7, atol=1e-9, method=method, max_steps=60_000
+    )
+    most = abs(C - ramp) / K  # of sqrt(|z|), in the end
+    root = brentq(
+        lambda s: -2 / K * (s + most * np.log1p(-s / most)) - 0.3, 0.0, most * (1 - 1e-12)
+    )
+    exact = np.sign(C - ramp) * root**2 + u[-2]
+    assert response.states[0, -2] == pytest.approx(exact, abs=1e-6)

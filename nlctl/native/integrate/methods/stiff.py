@@ -18,7 +18,8 @@ from .lu import Elimination, cost, place
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
 AHEAD = 1e-4  # part of a step by which time is varied
-ANOTHER = 0.5  # part of a rate: what differs by more is another one
+APART = 1e-3  # part of a rate by which it may differ from the solution's slope
+ANOTHER = 0.5  # part of what J says: what differs by more is another thing
 SHARE = 0.3  # of the defect at the end of a step: what of it may be an error of the solution
 
 
@@ -184,20 +185,20 @@ def _spectral_radius(task, w):
 
 @numba.njit(**INNER)
 def _defect(task, lane, w):
-    """Fill w.stiff.defect with f - x' at the end of a step; return whether x' is another rate."""
-    defect, is_another = w.stiff.defect, False
+    """Fill w.stiff.defect with f - x' at the end of a step; return whether it counts anywhere."""
+    defect, counts = w.stiff.defect, False
     rodas5p.end_slope(lane.step, w.x_flat, w.x_new_flat, w.stiff.U, defect)
     for i in range(defect.size):
         defect[i] = w.k[w.k.shape[0] - 1, i, 0] - defect[i]
-        is_another |= _is_apart(task, lane, w, i)
-    return is_another
+        counts |= _is_apart(task, lane, w, i)
+    return counts
 
 
 @numba.njit(**INNER)
 def _is_apart(task, lane, w, i):
-    """Whether most of a rate at the end of a step is its defect, and that counts in the step."""
+    """Whether a rate at the end of a step is apart from the slope by what counts in the step."""
     size, rate = abs(w.stiff.defect[i]), w.k[w.k.shape[0] - 1, i, 0]
-    if size > ANOTHER * max(abs(rate), abs(rate - w.stiff.defect[i])):
+    if size > APART * max(abs(rate), abs(rate - w.stiff.defect[i])):
         return lane.step * size > _tolerance(task, w, i)
     return False
 
@@ -285,8 +286,8 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
     w.t[0] = lane.t + h
     evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.events.g, w.memories.m)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, stiff.U, task.rtol, task.atol)
-    is_another = _defect(task, lane, w)
-    if is_another and task.fixed == 0.0 and w.error[0] <= 1.0:
+    counts = _defect(task, lane, w)
+    if counts and task.fixed == 0.0 and w.error[0] <= 1.0:
         w.error[0] = max(w.error[0], _misled(rhs, task, lanes, w, only_entries))
     if task.rows.memory.size:
         error = _memory_error(rhs, task, lanes, w, only_entries)
