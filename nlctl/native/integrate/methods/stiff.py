@@ -18,7 +18,7 @@ from .lu import Elimination, cost, place
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
 AHEAD = 1e-4  # part of a step by which time is varied
-APART = 1e-3  # part of a rate by which it may differ from the solution's slope
+LEAST_DEFECT = 1e-3  # part of a rate by which it may differ from the solution's slope
 ANOTHER = 0.5  # part of what J says: what differs by more is another thing
 SHARE = 0.3  # of the defect at the end of a step: what of it may be an error of the solution
 
@@ -198,7 +198,7 @@ def _defect(task, lane, w):
 def _is_apart(task, lane, w, i):
     """Whether a rate at the end of a step is apart from the slope by what counts in the step."""
     size, rate = abs(w.stiff.defect[i]), w.k[w.k.shape[0] - 1, i, 0]
-    if size > APART * max(abs(rate), abs(rate - w.stiff.defect[i])):
+    if size > LEAST_DEFECT * max(abs(rate), abs(rate - w.stiff.defect[i])):
         return lane.step * size > _tolerance(task, w, i)
     return False
 
