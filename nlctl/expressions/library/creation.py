@@ -196,7 +196,9 @@ def writable(graph: Graph, value: Any) -> Any:
 
 def written_into(graph: Graph, value: Any, array: Any) -> Any:
     """Return a value as an array of integers takes it: without what is behind the point."""
-    if not isinstance(array, Tracer) or {e.kind for e in array.values.flat} != {"i"}:
+    if not isinstance(array, Tracer) or not array.values.size:
+        return value
+    if any(e.kind != "i" for e in array.values.flat):  # as the first one of floats says
         return value
     value = traced(graph, value)
     kinds = {e.kind for e in value.values.flat}

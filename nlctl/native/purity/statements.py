@@ -207,7 +207,9 @@ class CallWalker(Expressions):
 
     def visit_Call(self, node: ast.Call) -> KnownValue:
         """Write as a statement does what setattr() names, of what was there before."""
-        is_setter = len(node.args) == 3 and self.visit(node.func).known is setattr
+        # What calls others does not name setattr, and is walked once, below.
+        calls = any(isinstance(part, ast.Call) for part in ast.walk(node.func))
+        is_setter = len(node.args) == 3 and not calls and self.visit(node.func).known is setattr
         name = self.visit(node.args[1]).known if is_setter else None
         if not isinstance(name, str) or not was_there(self.visit(node.args[0]).known):
             return super().visit_Call(node)

@@ -101,8 +101,7 @@ class HeldRun(SteppedRun):
             return run
         run = self._turned(go_on(run, ROUNDS))
         while run.lanes["status"][0] == RUNNING:
-            run = next_window(self.compiled, run, self.paces, self.p)
-            run = turned(self.compiled, run, self.p, self.settings)
+            run = self._turned(next_window(self.compiled, run, self.paces, self.p))
         return run
 
     def arguments(self, run: Run) -> tuple[Any, ...]:

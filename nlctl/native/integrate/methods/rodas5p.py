@@ -89,12 +89,17 @@ def right_side(s, h, dx, f_t, U):
 
 
 @numba.njit(**INNER)
+def tolerance(i, x, x_new, rtol, atol):
+    """Return what the error of a state may be in a step."""
+    return atol + rtol * max(abs(x[i, 0]), abs(x_new[i, 0]))
+
+
+@numba.njit(**INNER)
 def error_norm(x, x_new, U, rtol, atol):
     """Return the largest error over the tolerance; not finite if a state is not."""
     largest, spoilt = 0.0, 0.0
     for i in range(x.shape[0]):
-        scale = atol + rtol * max(abs(x[i, 0]), abs(x_new[i, 0]))
-        part = abs(U[7, i] / scale)
+        part = abs(U[7, i] / tolerance(i, x, x_new, rtol, atol))
         largest = part if part > largest else largest
         spoilt += 0.0 * (part + x_new[i, 0])  # NaN or infinity: no maximum keeps it
     return largest + spoilt

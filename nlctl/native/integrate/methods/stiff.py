@@ -205,7 +205,7 @@ def _is_apart(task, lane, w, i):
 
 @numba.njit(**INNER)
 def _tolerance(task, w, i):
-    return task.atol + task.rtol * max(abs(w.x[i, 0]), abs(w.x_new[i, 0]))
+    return rodas5p.tolerance(i, w.x, w.x_new, task.rtol, task.atol)
 
 
 @numba.njit(**INNER)
