@@ -97,7 +97,7 @@ def slid_from(
 
     if not settings.slide:
         return SlidRun(compiled=course.compiled, p=p, reached=reached)
-    return sliding(run, course.compiled, reached, (x0, p), float(np.ptp(course.times)))
+    return sliding(run, course.compiled, reached, (x0, p), course.times)
 
 
 def run_once(

@@ -20,7 +20,7 @@ from ..errors import CompileError, ParameterError
 from ..expressions.conditions import zigzag
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Graph, Untraceable
-from ..sliding import IdealRelay
+from ..sliding.relay import RelayOfCondition
 from .chattering.steps import Jump
 from .compiled import Compiled
 from .diagram.nodes import Node, Slide
@@ -50,6 +50,8 @@ _AROUND = 64  # points
 _NEAR = 0.25  # of a step: how far from its jump it is looked at
 _AHEAD = 1e-9  # times the run's length: what comes no further has not slid
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
+_OWN = 2  # states of a relay: its mode, and when both sides have led away
+_ROUNDING = 1e-12  # of a time
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
 
 
@@ -286,10 +288,10 @@ class SlidRun:
         places, rows = slide_places(nodes), slide_rows(self.compiled)
         for (slide, _), i, (_, *ends) in zip(self.slides, places, rows, strict=True):
             below, above = (set(log.time[noted == row].tolist()) for row in ends)
-            modes = self.reached.states[nodes[i].state_offset, 1:]
-            if below or above or np.any(np.abs(modes) < 0.5):
+            modes, parted = self.reached.states[nodes[i].state_offset :][:_OWN]
+            if below or above or np.any(np.abs(modes[1:]) < 0.5):
                 slides.append(slide.name)
-            forks |= below & above  # rates lead away on both sides at once
+            forks |= set(parted[1:][np.diff(parted) > _ROUNDING * np.abs(parted[1:])].tolist())
         return replace(
             reached,
             statistics=replace(
@@ -303,7 +305,7 @@ def sliding(
     compiled: Compiled,
     reached: Trajectory,
     start: tuple[np.ndarray, np.ndarray],
-    span: float,
+    times: np.ndarray,
 ) -> SlidRun:
     """Return a run that chatters no longer, if relays can stand for the conditions of that."""
     # `run` has a diagram, an initial state and a parameter vector.
@@ -316,14 +318,14 @@ def sliding(
         scale = done.atol + done.rtol * np.maximum(np.abs(jump.before), np.abs(jump.after))
         more = slides_at(last.compiled, last.p, jump, scale)
         if not more and _has_loops(compiled):
-            return sliding(run, _in_numbers(compiled), reached, start, span)
-        tried = (_further(run, compiled, last, each, start, span) for each in more)
+            return sliding(run, _in_numbers(compiled), reached, start, times)
+        tried = (_further(run, compiled, last, each, start, times) for each in more)
         if (further := next(filter(None, tried), None)) is None:
             break
         last = further
         # of relays whose inputs depend on each other no output is known: it ends where that is so
         ahead = last.reached.statistics.time - best.reached.statistics.time
-        if last.reached.statistics.status is Status.OK or ahead > _AHEAD * span:
+        if last.reached.statistics.status is Status.OK or ahead > _AHEAD * np.ptp(times):
             best = last
     return best
 
@@ -334,18 +336,23 @@ def _further(
     last: SlidRun,
     more: Slides,
     start: tuple[np.ndarray, np.ndarray],
-    span: float,
+    times: np.ndarray,
 ) -> SlidRun | None:
     """Return a run with relays for more conditions, None if they cannot be read."""
     x0, p = start
     slides = (*last.slides, *((_counted(slide, last.slides), far) for slide, far in more))
     try:
         diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
-        whole = _parameters(diagram, p, [far for _, far in slides], span)
-        reached = run(diagram, np.append(x0, np.zeros(len(slides))), whole)
+        whole = _parameters(diagram, p, [far for _, far in slides], float(np.ptp(times)))
+        reached = run(diagram, with_modes(x0, len(slides), times), whole)
     except (CompileError, ParameterError):
         return None
     return SlidRun(compiled=diagram, p=whole, reached=reached, slides=slides)
+
+
+def with_modes(x0: np.ndarray, count: int, times: np.ndarray) -> np.ndarray:
+    """Return an initial state with those of so many relays: both sides have never led away."""
+    return np.append(x0, np.tile([0.0, times[0] - np.ptp(times)], count))
 
 
 def _has_loops(compiled: Compiled) -> bool:
@@ -382,7 +389,7 @@ def with_relays(compiled: Compiled, slides: tuple[Slide, ...], p: np.ndarray) ->
 def _read_with(compiled: Compiled, slides: tuple[Slide, ...]) -> Slid:
     read, program = compiled.schedule, compiled.program
     n, count = read.system.nstates or 0, len(read.nodes)
-    nodes = [_relay(slide, n + k) for k, slide in enumerate(slides)]
+    nodes = [_relay(slide, n + _OWN * k) for k, slide in enumerate(slides)]
     at, layout = length(program.layout), {i: program.layout[i] for i in range(count)}
     for k, node in enumerate(nodes):
         layout[count + k] = slots_of(node.system, node.path, at)
@@ -392,7 +399,7 @@ def _read_with(compiled: Compiled, slides: tuple[Slide, ...]) -> Slid:
     schedule = replace(
         read, nodes=(*read.nodes, *nodes), order=(*read.order, *range(count, count + len(nodes))),
         unknown=(*read.unknown, *[frozenset[int]()] * len(nodes)),
-        system=stand_in(read.system, n + len(nodes), read.system.noutputs or 0),
+        system=stand_in(read.system, n + _OWN * len(nodes), read.system.noutputs or 0),
     )  # fmt: skip
     moved = {i: program.fixed[before] for i, before in later.items() if before in program.fixed}
     whole = replace(
@@ -408,7 +415,7 @@ def _relay(slide: Slide, state: int) -> Node:
     """Return an ideal relay that stands for a condition, and has no signals."""
     name = f"{slide.what[0].replace('.', '_')}_slides"  # names have no dots, paths do
     return Node(
-        path=slide.what[0], system=block(IdealRelay(), name), state_offset=state, inputs=({},),
+        path=slide.what[0], system=block(RelayOfCondition(), name), state_offset=state, inputs=({},),
         direct=np.zeros((1, 1), dtype=bool), slide=slide,
     )  # fmt: skip
 

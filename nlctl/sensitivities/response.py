@@ -22,7 +22,7 @@ from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings, solver_settings
-from ..native.slid import SlidRun
+from ..native.slid import SlidRun, with_modes
 from ..native.spare import give_back
 from ..params import checked_times
 from ..responses.arguments import (
@@ -85,7 +85,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     one = _integrated(compiled, run, named, (u, x0, p, scale))
     slid = _slid(compiled, run, one.reached, (u, x0, p))
     if slid.slides:
-        x0 = np.append(x0, np.zeros(len(slid.slides)))
+        x0 = with_modes(x0, len(slid.slides), run.times)
         one = _integrated(slid.compiled, run, named, (u, x0, slid.p, scale))
         one = replace(one, reached=slid.named(one.reached))
     differentiated, reached, start, whole = one.differentiated, one.reached, one.start, one.p

@@ -41,9 +41,18 @@ def relay_mode(u, mode, p):
     here = np.where(u[0] == 0, kept, np.sign(u[0]))  # both lead away from u = 0: it continues
     down = np.where((above <= 0) & (below < 0), -1.0, here)
     through = np.where((above > 0) & (below >= 0), 1.0, down)
-    crossing = np.where((above < 0) & (below > 0), 0.0, through) + 0.0 * (above + below)
+    leads_back = (above < 0) & (below > 0)
+    stays = (kept == 0) & (above == 0) & (below == 0)  # neither leads away, and it is there
+    crossing = np.where(leads_back | stays, 0.0, through) + 0.0 * (above + below)
     near = np.where(kept * u[0] > 0, kept, crossing)
     return np.where(np.abs(u[0]) > p.rest, np.sign(u[0]), near + 0.0 * u[0])
+
+
+@equation
+def parts_here(u, mode, now, p):
+    """Whether it slides no longer because u' leads away from u = 0 on both sides."""
+    above, below = rates_beside(u, p)
+    return (kept_mode(mode) == 0) & (now != 0) & (above > 0) & (below < 0)
 
 
 @record
@@ -123,7 +132,7 @@ class IdealRelay:
     def output(t: float, x: Any, u: Any, p: Any) -> Any:
         """Next to u = 0 the side, with its height; on it what keeps u' = 0."""
         # A mode beyond 1 counts unchanged: it jumps, and nothing pushes it.
-        (mode,) = x
+        mode = x[0]
         _, drift, gain = u
         keeping = np.where(gain == 0, 0.0, -(drift + p.rate * u[0]) / gain)
         beside = p.height * kept_mode(mode) * np.maximum(1.0, np.abs(mode))
@@ -133,15 +142,35 @@ class IdealRelay:
     @equation
     def commit(t: float, x: Any, u: object, p: object) -> Any:
         """The mode."""
-        (mode,) = x
-        return (relay_mode(u, mode, p),)
+        return (relay_mode(u, x[0], p),)
 
     @staticmethod
     @equation
     def switching(t: float, x: Any, u: Any, p: Any) -> Any:
         """Where u is 0; while it slides, where it jumps away and where one rate leads away."""
-        (mode,) = x
+        mode = x[0]
         above, below = rates_beside(u, p)
         slides = kept_mode(mode) == 0
         beyond = np.where(slides, p.rest - np.abs(u[0]), u[0])
         return beyond, np.where(slides, above, 1.0), np.where(slides, below, 1.0)
+
+
+@record
+class RelayOfCondition(IdealRelay):
+    """Ideal relay that knows when it has last slid to where both sides began to lead away (s)."""
+
+    states = memory = ("mode", "parted")
+
+    @staticmethod
+    @equation
+    def update(t: float, x: object, u: object, p: object) -> Any:
+        """Both change at events only."""
+        return 0.0, 0.0
+
+    @staticmethod
+    @equation
+    def commit(t: float, x: Any, u: object, p: object) -> Any:
+        """The mode, and the time if it leaves u = 0 where several solutions do."""
+        mode, parted = x
+        now = relay_mode(u, mode, p)
+        return now, np.where(parts_here(u, mode, now, p), t, parted)

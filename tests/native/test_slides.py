@@ -468,6 +468,39 @@ def test_where_both_sides_lead_away_the_run_says_so(method):
     assert np.abs(run.states[0, late]) == pytest.approx((times[late] - 1) ** 2 / 2, abs=1e-6)
 
 
+FORKING = {
+    "a state": lambda t, x, u, p: [1.0, 0.7 * x[0] * np.sign(x[1])],
+    "a sign of a state": lambda t, x, u, p: [1.0, 0.7 * np.sign(x[0]) * np.sign(x[1])],
+    "time": lambda t, x, u, p: [1.0, 0.7 * (t - 1) * np.sign(x[1])],
+    "a sign of time": lambda t, x, u, p: [1.0, 0.7 * np.sign(t - 1) * np.sign(x[1])],
+}
+
+
+@pytest.mark.parametrize("last", [3.0, 2.9])  # there are samples at 1 s, and none
+@pytest.mark.parametrize("gain", FORKING)
+@methods
+def test_whatever_turns_a_gain_says_where_both_sides_lead_away(method, gain, last):
+    """y' = 0.7 g sign(y) with g = t - 1, or its sign: y = 0 attracts until 1 s, and then repels."""
+    times = np.linspace(0, last, 31)
+    run = nlctl.input_output_response(plain(FORKING[gain], 2), times, 0, [-1.0, 0.3], method=method)
+    late = times - 1 if "sign" in gain else (times - 1) ** 2 / 2
+    right = np.where(times > 1, 0.7 * late, 0.0)
+    assert run.statistics.forks == pytest.approx((1.0,), abs=1e-6)
+    behind = times > 0.7
+    np.testing.assert_allclose(np.abs(run.states[1])[behind], right[behind], atol=1e-6)
+
+
+@methods
+def test_a_gain_that_touches_zero_is_no_fork(method):
+    """y' = -(t - 1)^2 sign(y) stays at 0: behind 1 s it attracts as before."""
+    times = np.linspace(0, 3, 31)
+    run = nlctl.input_output_response(
+        plain(lambda t, x, u, p: [-((t - 1) ** 2) * np.sign(x[0])], 1), times, 0, 0.2, method=method
+    )
+    assert run.statistics.forks == ()
+    np.testing.assert_allclose(run.states[0, times > 0.5], 0.0, atol=1e-6)
+
+
 def test_where_one_side_leads_away_there_is_one_way():
     run = nlctl.input_output_response(
         plain(lambda t, x, u, p: [0.2 - (1 - t) * np.sign(x[0])], 1), [0, 1, 3], 0, 0.2
