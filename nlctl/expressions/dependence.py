@@ -10,7 +10,7 @@ from .graph import LINEAR, OF_FACTORS, Expr, needed
 
 # each element of the result depends on all that goes in
 _WHOLE = ("sum", "call", "solve", *LINEAR, *OF_FACTORS)
-_AFFINE = ("add", "sub", "neg", "sum", "item", "slice", "concat")  # in what they are made of
+LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")  # in what they are made of
 
 
 def rows_read(leaf: Expr) -> list[int]:
@@ -60,7 +60,7 @@ def affine(expr: Expr, leaf: Expr) -> bool:
     """Whether an expression is a + b v for all values, as it is written."""
     for node, by in dependent_nodes(expr, leaf):
         linear = (
-            node.op in _AFFINE
+            node.op in LINEAR
             or (node.op == "mul" and sum(by) == 1)
             or (node.op == "div" and not by[1])
             or (node.op == "lu_solve" and not by[0])

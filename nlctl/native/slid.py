@@ -52,6 +52,7 @@ _AHEAD = 1e-9  # times the run's length: what comes no further has not slid
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
 _OWN = 2  # states of a relay: its mode, and when both sides have led away
 _ROUNDING = 1e-12  # of a time
+_ALIKE = 1e-9  # of rates
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
 
 
@@ -128,10 +129,7 @@ class _Around:
     def values(
         self, exprs: Sequence[Expr], arrays: dict[str, np.ndarray] | None = None
     ) -> np.ndarray:
-        """Return values of expressions at all points, those of vectors one below the other."""
-        values = evaluate_expressions(exprs, arrays or self.arrays)
-        shapes = ((e.size or 1, _AROUND) for e in exprs)
-        return np.concatenate([np.zeros((0, _AROUND)), *map(np.broadcast_to, values, shapes)])
+        return _values(exprs, arrays or self.arrays)
 
     @property
     def _rows(self) -> dict[int, Expr]:
@@ -231,6 +229,12 @@ class _Around:
         places = {of_rows[row] for row in rows}
         places |= {k + located[k].integers for k in places}
         return tuple(sorted(places, key=lambda k: (-located[k].integers, k)))
+
+
+def _values(exprs: Sequence[Expr], arrays: dict[str, np.ndarray]) -> np.ndarray:
+    """Return values of expressions at all points, those of vectors one below the other."""
+    values, shapes = evaluate_expressions(exprs, arrays), ((e.size or 1, _AROUND) for e in exprs)
+    return np.concatenate([np.zeros((0, _AROUND)), *map(np.broadcast_to, values, shapes)])
 
 
 def _has_both_signs(s: np.ndarray) -> bool:
@@ -344,10 +348,39 @@ def _further(
     try:
         diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
         whole = _parameters(diagram, p, [far for _, far in slides], float(np.ptp(times)))
+        check_sides(compiled, diagram, p, whole, last.reached.statistics.jump)
         reached = run(diagram, with_modes(x0, len(slides), times), whole)
     except (CompileError, ParameterError):
         return None
     return SlidRun(compiled=diagram, p=whole, reached=reached, slides=slides)
+
+
+def check_sides(
+    compiled: Compiled, slid: Compiled, p: np.ndarray, whole: np.ndarray, jump: Jump | None
+) -> None:
+    """Refuse a diagram whose rates and outputs are others with each relay on its side, anywhere."""
+    if jump is None:
+        return
+    states = compiled.system.nstates or 0
+    jump = replace(jump, after=jump.after[:states], inputs=jump.inputs[: compiled.schedule.ninputs])
+    given = _far_points(compiled, p, jump, 4)
+    places = slide_places(slid.schedule.nodes)
+    modes = [slid.schedule.nodes[i].state_offset for i in places]
+    extended = np.ones((slid.system.nstates or 0, _AROUND))
+    extended[:states] = given["x"]
+    there = given | {"x": extended, "p": whole[:, None]}
+    read, original = slid.equations_with(whole), compiled.equations_with(p)
+    functions = declared_functions(read.results, slid.program.switching)
+    levels = read.conditions.levels  # of what jumps at integers: declared is 1 where it is not met
+    met = [(functions | levels)[rows[0]] for rows in slide_rows(slid)]
+    extended[modes] = np.sign(_values(met, there))
+    for name, width in (("dx", states), ("y", compiled.system.noutputs or 0)):
+        right, now = (
+            _values([e for e, _ in equations.pieces(name)], arrays)[:width]
+            for equations, arrays in ((original, given), (read, there))
+        )
+        if not np.allclose(now, right, _ALIKE, 0.0, equal_nan=True):
+            raise CompileError("relays do not stand for the conditions that they were made for")
 
 
 def with_modes(x0: np.ndarray, count: int, times: np.ndarray) -> np.ndarray:
@@ -415,8 +448,8 @@ def _relay(slide: Slide, state: int) -> Node:
     """Return an ideal relay that stands for a condition, and has no signals."""
     name = f"{slide.what[0].replace('.', '_')}_slides"  # names have no dots, paths do
     return Node(
-        path=slide.what[0], system=block(RelayOfCondition(), name), state_offset=state, inputs=({},),
-        direct=np.zeros((1, 1), dtype=bool), slide=slide,
+        path=slide.what[0], system=block(RelayOfCondition(), name), state_offset=state,
+        inputs=({},), direct=np.zeros((1, 1), dtype=bool), slide=slide,
     )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array
 from ...expressions.conditions import of_zigzag, switching_functions, zigzag
+from ...expressions.dependence import LINEAR
 from ...expressions.functions import COUNTING
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
 from ...wording import counted
@@ -35,7 +36,6 @@ Pairs = Mapping[Expr, tuple[Expr, Expr]]  # of comparisons what they are below, 
 _EQUAL = {"eq": False, "ne": True}  # next to a place at which two numbers are equal
 _JUMPING = (*ORDERS, *_EQUAL, "sign", "heaviside", *COUNTING, "remainder", "fmod")
 _BLENDED = ("dx", "g", "y")
-_SUMS = ("add", "sub", "neg", "sum", "concat", "item", "slice")  # linear in all that they are of
 _SEVERAL = 8  # conditions on which one number may depend otherwise: it has 2^8 sides
 
 
@@ -166,13 +166,13 @@ def _by_terms(
         return change(0, exprs)
     depends: dict[Expr, frozenset[int]] = {}
     for node in needed(exprs):
-        here = {k for k, slide in enumerate(slides) if node in slide.pairs}
-        depends[node] = frozenset(here).union(*(depends[arg] for arg in node.args))
+        depends[node] = _changing(slides, node).union(*(depends[arg] for arg in node.args))
 
     def terms(node: Expr) -> tuple[Expr, ...]:
         by = [depends[arg] for arg in node.args]
         apart = (node.op == "mul" and by[0].isdisjoint(by[1])) or (node.op == "div" and not by[1])
-        return node.args if len(depends[node]) > 1 and (node.op in _SUMS or apart) else ()
+        apart |= node.op == "select" and not by[0]  # as math.sin has one: it is NaN of infinity
+        return node.args if len(depends[node]) > 1 and (node.op in LINEAR or apart) else ()
 
     def changed(node: Expr) -> Expr:
         if terms(node):
@@ -187,6 +187,16 @@ def _by_terms(
 
     new: dict[Expr, Expr] = {}
     return [deduce(new, expr, terms, changed) for expr in exprs]
+
+
+def _changing(slides: Sequence[_Between], node: Expr) -> frozenset[int]:
+    """Return the slides that change an expression itself, or what others have changed it to."""
+    here, ways = set[int](), {node}
+    for k, slide in enumerate(slides):
+        if not ways.isdisjoint(slide.pairs):
+            here.add(k)
+            ways.update(needed([e for way in ways for e in slide.pairs.get(way, ())]))
+    return frozenset(here)
 
 
 def with_slides(
@@ -215,16 +225,21 @@ def _slides(reader: Reader, results: _Results, conditions: Conditions) -> list[_
     graph, first = reader.graph, len(relay_places(reader.blocks))
     every = [*_pieces(results), *(e for part in reader.fixed_points.values() for e in part)]
     declared = declared_functions(results, sum(map(count_switching_functions, reader.blocks)))
-    slides: list[_Between] = []
+    slides, gone = list[_Between](), set[Expr]()
     for i, node in enumerate(reader.blocks):
         if (slide := node.slide) is None:
             continue
         functions = [declared[row] for row in slide.declared]
         functions += [conditions.located[place].function for place in slide.places]
-        changing = changing_at(graph, every, functions)
+        changing = [one for one in changing_at(graph, every, functions) if one not in gone]
         if len(changing) != len(slide.sides):
             raise CompileError(f"{slide.name} compares otherwise than where it was seen to jump")
-        sides = zip(changing, slide.sides, strict=True)
+        pairs = {
+            one: on_sides(graph, one, pair, functions)
+            for one, pair in zip(changing, slide.sides, strict=True)
+        }
+        every += [e for pair in pairs.values() for e in pair]  # it may have another zero there
+        gone |= {one for one, pair in pairs.items() if one not in pair}
         function = functions[0]
         if slide.integers:
             function = next(filter(None, (zigzag(graph, one) for one in changing)), function)
@@ -232,8 +247,7 @@ def _slides(reader: Reader, results: _Results, conditions: Conditions) -> list[_
         slides.append(
             _Between(
                 graph=graph, slide=slide, place=i, leaf=leaf, kept=kept_of(reader, i),
-                function=function,
-                pairs={one: on_sides(graph, one, pair, functions) for one, pair in sides},
+                function=function, pairs=pairs,
             )
         )  # fmt: skip
     return slides
@@ -272,6 +286,7 @@ def _derived(
     motion = Motion(
         rates=blended([rates[row] for row in sorted(rates)]), solutions=reader.fixed_points,
         inputs=schedule.system.ninputs or 0, behind=schedule.ninputs - schedule.rates,
+        products=True,
     )  # fmt: skip
     return sliding_rates(graph, inputs, motion, output)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from ...errors import CompileError
 from ...expressions.bends import replaced_parts
@@ -42,6 +43,7 @@ class Motion:
     # as `fixed_points` of `nlctl.expressions.derivatives.tangents`
     solutions: Mapping[str, Sequence[Expr]]
     inputs: int = 0  # number of the diagram's inputs
+    products: bool = False  # whether relays may multiply each other, see `together`
     behind: int = 0  # place, among the program's inputs, from which on their rates follow
 
 
@@ -98,7 +100,8 @@ def _together(
         )
         for i, rate in rates.items()
     ]  # fmt: skip
-    own = own_rates(graph, coupled, lambda leaf: slope_of(graph, leaf, motion.solutions))
+    slopes = partial(slope_of, graph, solutions=motion.solutions)
+    own = own_rates(graph, coupled, slopes, motion.products)
     if own is None:
         names = ", ".join(f"'{relays[i].name}'" for i in rates)
         raise CompileError(

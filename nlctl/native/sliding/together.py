@@ -1,4 +1,4 @@
-"""Ideal relays that act on the rates of each other's inputs, where all of these are affine.
+"""Ideal relays that act on the rates of each other's inputs, where all of these are affine in each.
 
 With u' = a + B v of several relays, those that slide have the outputs that keep their inputs where
 they are, given those of the others.  Filippov's field is one there: every convex combination of the
@@ -9,7 +9,7 @@ own output v does to the rate of its own input follows by elimination of all oth
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
 from ...expressions.bends import replaced_parts
@@ -17,6 +17,7 @@ from ...expressions.dependence import affine
 from ...expressions.graph import Expr, Graph, needed
 from .pieces import LeafDerivative
 
+_MOST = 6  # of which rates have products: each is read for itself
 _ROUNDING = 1e-9  # of what a relay does to its input, when others have been eliminated
 Slopes = Callable[[Expr], LeafDerivative]
 
@@ -33,19 +34,59 @@ class Coupled:
 
 
 def own_rates(
-    graph: Graph, relays: Sequence[Coupled], slope: Slopes
+    graph: Graph, relays: Sequence[Coupled], slope: Slopes, products: bool
 ) -> list[tuple[Expr, Expr]] | None:
     """Return a and b of each relay's u' = a + b v, others sliding or not; None if not affine."""
+    # With `products` rates may be made of products of what some do, of which one slides at a time.
     leaves = [relay.leaf for relay in relays]
     if any(relay.rate.size or not affine(relay.rate, leaf) for relay in relays for leaf in leaves):
         return None
-    zero = graph.const(0.0)
+    system = _system(graph, relays, slope)
+    if set(leaves).isdisjoint(needed([e for row in system.b for e in row])):
+        return [system.alone(k) for k in range(len(relays))]
+    if not products or len(relays) > _MOST:
+        return None
+    return [_one_by_one(graph, relays, slope, k) for k in range(len(relays))]
+
+
+def _system(graph: Graph, relays: Sequence[Coupled], slope: Slopes) -> _System:
+    """Return the rates of the inputs of several relays, read off as a + B v."""
+    leaves, zero = [relay.leaf for relay in relays], graph.const(0.0)
     a = replaced_parts(graph, [relay.rate for relay in relays], dict.fromkeys(leaves, zero))
     b = [[slope(leaf)(relay.rate) or zero for leaf in leaves] for relay in relays]
-    if not set(leaves).isdisjoint(needed([e for row in b for e in row])):
-        return None
-    system = _System(graph=graph, relays=tuple(relays), a=tuple(a), b=tuple(map(tuple, b)))
-    return [system.alone(k) for k in range(len(relays))]
+    return _System(graph=graph, relays=tuple(relays), a=tuple(a), b=tuple(map(tuple, b)))
+
+
+def _one_by_one(
+    graph: Graph, relays: Sequence[Coupled], slope: Slopes, k: int
+) -> tuple[Expr, Expr]:
+    """Return a and b of relay `k`, where rates are made of products of what two do."""
+    # They are a + b v for each of them while the other does not slide.  Where both did, no one v
+    # would be Filippov's: one that meets another that slides passes, by the sign of its input.
+    op, zero, relay = graph.op, graph.const(0.0), relays[k]
+    instead = {
+        other.leaf: op("select", other.slides, other.leaf, other.held)
+        for other in relays if other is not relay
+    }  # fmt: skip
+    rates = replaced_parts(graph, [other.rate for other in relays], instead)
+    pairs = zip(relays, rates, strict=True)
+    system = _system(graph, [replace(other, rate=rate) for other, rate in pairs], slope)
+    partners = [_multiplies(system, k, j) for j in range(len(relays))]
+    none = dict.fromkeys((other.leaf for other in relays), zero)
+    b = tuple(tuple(replaced_parts(graph, row, none)) for row in system.b)
+    drift, gain = replace(system, b=b).alone(k)
+    stays = graph.const(False)
+    for j, other in enumerate(relays):
+        if partners[j]:
+            first = other.slides if j < k else op("and", other.slides, op("not", relay.slides))
+            stays = op("or", stays, first)
+    return op("select", stays, zero, drift), op("select", stays, graph.const(1.0), gain)
+
+
+def _multiplies(system: _System, k: int, j: int) -> bool:
+    """Whether a rate has a product of what relays `k` and `j` do."""
+    leaf = system.relays[j].leaf
+    return j != k and leaf in needed([row[k] for row in system.b])
 
 
 @dataclass(frozen=True, kw_only=True)
