@@ -39,7 +39,6 @@ from .values import (
     Unknown,
     captured,
     element,
-    forgotten,
     holder,
     is_itself_alone,
     least_upper_bound,
@@ -48,6 +47,7 @@ from .values import (
     one_among,
     row,
 )
+from .views import attribute_of_array, indexed
 from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
@@ -354,13 +354,7 @@ class Expressions(ast.NodeVisitor):
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
         self.operands([base])
-        if not base.holds and any(isinstance(index, ast.List) for index in indices):
-            return replace(forgotten(base), own=True)  # a copy of these elements
-        is_view = any(isinstance(key, slice | type(None)) for key in keys)
-        if is_view or any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
-            return forgotten(base)  # or may be one
-        whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
-        return FRESH if whole else element(base)
+        return indexed(base, indices, values)
 
     def visit_Attribute(self, node: ast.Attribute) -> KnownValue:
         return self.attribute(self.visit(node.value), node.attr)
@@ -369,6 +363,8 @@ class Expressions(ast.NodeVisitor):
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
         if isinstance(thing, Unknown | Pure):
+            if isinstance(thing, Unknown) and not (base.own or base.holds):
+                return attribute_of_array(base, name)
             is_new = base.own and (base.inside or not base.holds)
             return replace(base, own=base.inside if isinstance(thing, Pure) else is_new)
         if isinstance(thing, Instance):
@@ -380,7 +376,7 @@ class Expressions(ast.NodeVisitor):
         if isinstance(thing, OneOf):
             return least_upper_bound([self.attribute(choice, name) for choice in thing.choices])
         if isinstance(thing, np.ndarray):
-            return forgotten(base)
+            return attribute_of_array(base, name)
         entry = inspect.getattr_static(type(thing), name, None)
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
             self.walk.captured(type(thing), name, entry)

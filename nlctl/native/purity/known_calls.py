@@ -8,7 +8,6 @@ import functools
 import inspect
 import logging
 import re
-import sys
 import warnings
 from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, namedtuple
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from . import method_names as named
-from .handed_on import handed_on, result_of_reduce, rows_of_functions, views_of
+from .handed_on import handed_on, result_of_reduce, rows_of_functions, written_places
 from .values import (
     FRESH,
     OUTSIDE,
@@ -54,6 +53,7 @@ from .values import (
     python_function,
     row,
 )
+from .views import LISTS_OF_VIEWS, VIEWS, viewed, viewed_by_function, views_of
 from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
@@ -257,10 +257,10 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
         if name == "astype" and given.names.get("copy", captured(True)).known is not True:
-            return forgotten(base)
+            return viewed(name, base)
         return _read(base, name, given.places)
-    if name in named.VIEWS or name in ("T", "flat"):
-        return forgotten(base)
+    if name in VIEWS:
+        return viewed(name, base, given)
     if name in named.CHANGING:
         _written(base, f"{name}()", _RECORD if name in named.RECORDING else MEMORY)
         return least_upper_bound([element(base), *given.places[1:2]]) if base.holds else FRESH
@@ -452,26 +452,18 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if _makes_objects(thing, module):
         # it may hold what it is given, instead of copies
         return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
-    for value in given.places[_place_of_out(thing, name) :]:
-        _written(value, f"{name}(..., out)")
+    for value, how in written_places(thing, name, given):
+        _written(value, f"{name}(..., {how})")
     may_be_it = given.names.get("copy", captured(True)).known is not True
     if name == "nan_to_num" and may_be_it:
         _written(given.places[0], f"{name}()")
-    if name in named.LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):
-        several = name in ("broadcast_arrays", "meshgrid")
-        return views_of(given.places if several else given.places[:1])
+    if name in LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):
+        return views_of(name, given.places)
     if name == "einsum" and len(given.places) == 2:
         return forgotten(given.places[1])
-    if name in named.VIEWS or may_be_it or module.startswith("numpy.ma"):
-        return replace(forgotten(given.places[0]), holds=False) if given.places else FRESH
+    if name in VIEWS or may_be_it or module.startswith("numpy.ma"):
+        return viewed_by_function(name, given)
     return FRESH
-
-
-def _place_of_out(thing: object, name: str) -> int:
-    """Return the place from which arguments are arrays that are written into."""
-    if isinstance(thing, np.ufunc):
-        return thing.nin
-    return {"clip": 3, "dot": 2}.get(name, sys.maxsize)
 
 
 def _makes_objects(thing: object, module: str) -> bool:

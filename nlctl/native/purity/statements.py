@@ -237,7 +237,8 @@ class CallWalker(Expressions):
             for part in ast.walk(case.pattern):
                 name = getattr(part, "name", None) or getattr(part, "rest", None)
                 if name:
-                    self.assign(name, KnownValue(subject.own and subject.inside, subject.inside))
+                    is_own = subject.own and subject.inside
+                    self.assign(name, KnownValue(is_own, subject.inside, rank=subject.rank))
                 if isinstance(part, ast.MatchSingleton) and part.value is not None:
                     self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
                 if isinstance(part, ast.MatchClass):

@@ -27,7 +27,7 @@ class Attributes(Unknown):
 
 
 UNKNOWN_VALUE = Unknown()
-ARRAYS = Unknown()  # what holds numbers and arrays alone
+_RANKS = 32  # indices of an array, beyond which it is not followed
 _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
@@ -161,6 +161,9 @@ class KnownValue:
     # whether it keeps what is put into it (lists, tuples, dicts), instead of copying numbers
     holds: bool = False
     known: Any = UNKNOWN_VALUE  # the object itself, if it was there before the call
+    # of an array that it has not made, how many indices reach a number, at most: fewer reach
+    # a view, through which the array is written into
+    rank: int | None = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, KnownValue) and self.marks == other.marks
@@ -172,13 +175,21 @@ class KnownValue:
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
         kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
-        kinds |= Attributes
+        kinds |= Attributes | Arrays
         known = self.known if isinstance(self.known, kinds) else id(self.known)
-        return self.own, self.inside, self.holds, known
+        return self.own, self.inside, self.holds, self.rank, known
+
+
+@dataclass(frozen=True)
+class Arrays(Unknown):
+    """A list or tuple that the call has made of numbers and arrays alone."""
+
+    part: KnownValue
+    count: int | None = None  # of a tuple that is written out
 
 
 FRESH = KnownValue(True, True)
-VECTOR = KnownValue(False, True)  # numbers that belong to the caller
+VECTOR = KnownValue(False, True, rank=1)  # numbers that belong to the caller
 OUTSIDE = KnownValue(False, False, True)
 SLICE = KnownValue(True, True, known=slice(None))
 
@@ -188,7 +199,8 @@ def captured(thing: object) -> KnownValue:
     if isinstance(thing, (*PLAIN, Flag)):
         return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
-        return KnownValue(False, thing.ndim <= 1, known=thing)
+        is_open = thing.dtype.hasobject or thing.dtype.names or isinstance(thing, np.matrix)
+        return replace(view(OUTSIDE, None if is_open else thing.ndim), known=thing)
     numbers = isinstance(thing, tuple | list | dict | set | frozenset) and all(
         isinstance(v, PLAIN) for v in (thing.values() if isinstance(thing, dict) else thing)
     )
@@ -198,12 +210,30 @@ def captured(thing: object) -> KnownValue:
 def least_upper_bound(values: Iterable[KnownValue]) -> KnownValue:
     """Return what holds for each of several values."""
     values = list(values) or [FRESH]
-    return KnownValue(
-        own=all(v.own for v in values),
+    slices = [v for v in values if isinstance(v.known, slice)]
+    return KnownValue(  # what may be a slice or a number chooses what may be a view
+        own=all(v.own for v in values) and len(slices) in (0, len(values)),
         inside=all(v.inside for v in values),
         holds=any(v.holds for v in values),
         known=_of_any(values),
+        rank=greatest_rank(v for v in values if not v.own),
     )
+
+
+def greatest_rank(values: Iterable[KnownValue]) -> int | None:
+    """Return how many indices reach a number of each of several arrays."""
+    ranks = [v.rank for v in values]
+    known = [rank for rank in ranks if rank is not None]
+    return max(known) if known and len(known) == len(ranks) else None
+
+
+def view(value: KnownValue, rank: int | None) -> KnownValue:
+    """Return what is known of a view of an array, a number of which so many indices reach."""
+    if value.own:
+        return replace(forgotten(value), holds=False)
+    if rank is None or rank > _RANKS:
+        return KnownValue(False, False)
+    return KnownValue(False, rank <= 1, rank=max(rank, 0))
 
 
 def _of_any(values: list[KnownValue]) -> Any:
@@ -211,6 +241,8 @@ def _of_any(values: list[KnownValue]) -> Any:
     first = values[0].known
     if all(v.known is first for v in values):
         return first
+    if all(isinstance(v.known, slice) for v in values):
+        return SLICE.known
     if all(isinstance(v.known, Instance) for v in values):
         if any(v.known.cls is not first.cls for v in values):
             return OneOf(tuple(values))
@@ -220,6 +252,10 @@ def _of_any(values: list[KnownValue]) -> Any:
     if all(isinstance(v.known, RowOf) and len(v.known.parts) == _width(first) for v in values):
         columns = zip(*(v.known.parts for v in values), strict=True)
         return RowOf(tuple(map(least_upper_bound, columns)))
+    if all(isinstance(v.known, Arrays) for v in values):
+        counts = {v.known.count for v in values}
+        part = least_upper_bound(v.known.part for v in values)
+        return Arrays(part, counts.pop() if len(counts) == 1 else None)
     if all(isinstance(v.known, ListOf) for v in values):
         return ListOf(tuple(dict.fromkeys(c for v in values for c in v.known.choices)))
     return function_choice(values)
@@ -232,6 +268,8 @@ def _width(row: Any) -> int:
 def row(values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of a tuple of these."""
     held = holder(values)
+    if isinstance(held.known, Arrays):
+        held = replace(held, known=replace(held.known, count=len(values)))
     is_mixed = isinstance(held.known, Unknown) and any(
         isinstance(function_choice([v]), OneOf) or not (v.own or v.holds) for v in values
     )
@@ -240,8 +278,12 @@ def row(values: Sequence[KnownValue]) -> KnownValue:
 
 def element(value: KnownValue) -> KnownValue:
     """Return what is known of an element, whichever it is."""
-    known, holds = value.known, value.holds and value.known is not ARRAYS
-    plain = KnownValue(value.inside, value.inside, holds)
+    known = value.known
+    if value.rank is not None and not value.own:
+        return view(value, value.rank - 1) if value.rank > 1 else FRESH
+    if isinstance(known, Arrays):
+        return known.part
+    plain = KnownValue(value.inside, value.inside, value.holds)
     if isinstance(known, ListOf):
         return least_upper_bound(known.choices)
     if isinstance(known, OneOf):
@@ -261,6 +303,8 @@ def element(value: KnownValue) -> KnownValue:
 def one_among(value: KnownValue, parts: Iterable[Any]) -> KnownValue:
     """Return what is known of one of the parts of a list that was there before the call."""
     parts = list(parts)
+    if parts and all(isinstance(part, slice) for part in parts):
+        return SLICE
     if parts and all(isinstance(part, (*PLAIN, np.ndarray)) for part in parts):
         return forgotten(least_upper_bound(map(captured, parts)))
     return replace(value, known=choice_among(parts))
@@ -283,7 +327,7 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
     known = function_choice(values)
     known = ListOf(tuple(values)) if isinstance(known, OneOf) else known
     if known is UNKNOWN_VALUE and not any(v.holds for v in values):
-        known = ARRAYS
+        known = Arrays(forgotten(least_upper_bound(values)))
     return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 
 
@@ -320,7 +364,7 @@ def is_itself_alone(value: KnownValue) -> bool:
 
 def maybe_shared(value: KnownValue) -> KnownValue:
     """Return what is known of a list that may have been given what the call has not made."""
-    known = UNKNOWN_VALUE if value.known is ARRAYS else value.known
+    known = UNKNOWN_VALUE if isinstance(value.known, Arrays) else value.known
     return replace(value, inside=False, known=known)
 
 

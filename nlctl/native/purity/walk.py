@@ -107,7 +107,7 @@ class Walk(ABC):
             before = 0.0
         if name:
             kept = least_upper_bound([captured(before), value])
-            self._register(register, KnownValue(kept.own, kept.inside, kept.holds))
+            self._register(register, replace(kept, known=WORKSPACE.known))
         elif isinstance(thing, list):
             self._register(register, replace(WORKSPACE, holds=True))
         return True
