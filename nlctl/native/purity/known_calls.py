@@ -53,7 +53,7 @@ from .values import (
     python_function,
     row,
 )
-from .views import LISTS_OF_VIEWS, VIEWS, viewed, viewed_by_function, views_of
+from .views import LISTS_OF_VIEWS, VIEWS, viewed, viewed_by_function, views_of, with_objects
 from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
@@ -463,7 +463,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
         return forgotten(given.places[1])
     if name in VIEWS or may_be_it or module.startswith("numpy.ma"):
         return viewed_by_function(name, given)
-    return FRESH
+    return with_objects(given) or FRESH
 
 
 def _makes_objects(thing: object, module: str) -> bool:

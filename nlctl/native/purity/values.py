@@ -27,6 +27,7 @@ class Attributes(Unknown):
 
 
 UNKNOWN_VALUE = Unknown()
+MAYBE_NONE = Unknown()  # None, or something else
 _RANKS = 32  # indices of an array, beyond which it is not followed
 _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
@@ -243,6 +244,8 @@ def _of_any(values: list[KnownValue]) -> Any:
         return first
     if all(isinstance(v.known, slice) for v in values):
         return SLICE.known
+    if any(v.known in (None, MAYBE_NONE) for v in values if isinstance(v.known, Unknown | None)):
+        return MAYBE_NONE
     if all(isinstance(v.known, Instance) for v in values):
         if any(v.known.cls is not first.cls for v in values):
             return OneOf(tuple(values))
@@ -326,7 +329,8 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
     values = list(values)
     known = function_choice(values)
     known = ListOf(tuple(values)) if isinstance(known, OneOf) else known
-    if known is UNKNOWN_VALUE and not any(v.holds for v in values):
+    is_index = any(isinstance(v.known, slice | None) or v.known is MAYBE_NONE for v in values)
+    if known is UNKNOWN_VALUE and not is_index and not any(v.holds for v in values):
         known = Arrays(forgotten(least_upper_bound(values)))
     return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 

@@ -7,12 +7,12 @@ not through a number of it.  So of each view it is known how many indices reach 
 import ast
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from .values import (
     FRESH,
+    MAYBE_NONE,
     OUTSIDE,
     Arrays,
     Given,
@@ -100,6 +100,14 @@ def views_of(name: str, values: Sequence[KnownValue]) -> KnownValue:
     return KnownValue(True, False, True, known=Arrays(view(OUTSIDE, greatest_rank(values))))
 
 
+def with_objects(given: Given) -> KnownValue | None:
+    """Return what is known of an array of objects, which keeps what is put into it."""
+    kinds = [v.known for v in (*given.places[1:], given.names.get("dtype", FRESH))]
+    if not any(kind is object or (type(kind) is str and kind in ("O", "object")) for kind in kinds):
+        return None
+    return KnownValue(True, all(v.own and v.inside for v in given.every), True)
+
+
 def attribute_of_array(base: KnownValue, name: str) -> KnownValue:
     """Return what is known of an attribute of an array: a view of it, or what it measures."""
     if name in _MEASURES:
@@ -119,20 +127,13 @@ def indexed(
         return captured(base.known[keys[0]])
     is_view = any(isinstance(key, slice | type(None)) for key in keys)
     is_open = any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values)
+    is_open |= any(key is MAYBE_NONE for key in keys)
     if base.rank is None:
         return forgotten(base) if is_view or is_open else element(base)
     if is_open:  # one of them may be a tuple, and have new axes in it
-        return forgotten(base) if _are_numbers(values) else view(base, None)
+        numbers = all(isinstance(key, Arrays) for key in keys)
+        return forgotten(base) if numbers else view(base, None)
     rank = base.rank - sum(not isinstance(key, slice | type(None)) for key in keys)
     if rank > 0 or is_view:
         return view(base, rank + sum(key is None for key in keys))
     return FRESH
-
-
-def _are_numbers(values: Sequence[KnownValue]) -> bool:
-    """Whether indices are lists and tuples that hold neither slices nor new axes."""
-    for value in values:
-        known: Any = value.known.part.known if isinstance(value.known, Arrays) else value.known
-        if not isinstance(value.known, Arrays) or isinstance(known, slice | type(None)):
-            return False
-    return True

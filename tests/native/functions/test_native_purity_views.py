@@ -1,4 +1,4 @@
-"""Rows and other views share the memory of an array, numbers of it do not: writes through either."""
+"""Rows and other views share the memory of an array, numbers of it do not."""
 
 import copy
 import itertools
@@ -222,6 +222,27 @@ def array_of_memory(t, x, u, p):
     return -x
 
 
+def row_by_index_of_a_tuple(t, x, u, p):
+    place = [None, slice(None)]
+    r = x[tuple(place)][0]
+    r *= 2.0
+    return -x
+
+
+def place_or_new_axis(t, x, u, p):
+    place = None if u[0] < 9 else 0
+    r = x[place][0]
+    r *= 2.0
+    return -x
+
+
+def parts_in_array_of_objects(t, x, u, p):
+    parts = np.empty(2, dtype=object)
+    parts[0], parts[1] = x[:2], x[2:]
+    parts[0] *= 2.0
+    return -x
+
+
 def row_helper(r):
     r *= 1.01
     return r.sum()
@@ -261,7 +282,8 @@ WRITING = [
     column_by_swapaxes, element_of_a_row, row_by_index, element_of_row_by_index, row_by_variable,
     row_in_a_list, row_in_a_comprehension, row_of_an_iterator, row_of_zip, row_of_enumerate,
     row_of_pairs, no_axis_left, part_by_name, part_by_chosen_slice, squeezed_diagonal,
-    real_part_of_rows, same_in_columns, without_zeros, strided, array_of_memory, row_for_a_helper,
+    real_part_of_rows, same_in_columns, without_zeros, strided, array_of_memory,
+    row_by_index_of_a_tuple, place_or_new_axis, parts_in_array_of_objects, row_for_a_helper,
     row_of_a_parameter, row_of_a_captured_array, record_of_a_captured_array,
     solved_over_what_was_given,
 ]  # fmt: skip
@@ -362,9 +384,9 @@ def numbers_of_transposed(t, x, u, p):
     return -s * x
 
 
-def numbers_of_flat(t, x, u, p):
+def numbers_of_ravel(t, x, u, p):
     total = 0.0
-    for v in x.reshape(2, 2).flat:
+    for v in x.reshape(2, 2).T.ravel():
         v += 1.0
         total += v
     return -x * total
@@ -445,7 +467,7 @@ def numbers_of_records(t, x, u, p):
 def row_is_bound_again(t, x, u, p):
     total = np.zeros(2)
     for row in x.reshape(2, 2):
-        row = 1.1 * row  # noqa: PLW2901
+        row = 1.1 * row
         row += 1.0
         total += row
     return -x * total[0]
@@ -454,7 +476,8 @@ def row_is_bound_again(t, x, u, p):
 LEGAL = [
     number_of_an_array, number_of_a_matrix, number_by_shape_in_a_tuple, numbers_taken_apart,
     numbers_of_rows, numbers_of_zip, numbers_of_enumerate, numbers_by_variable_places,
-    numbers_of_a_list_of_rows, numbers_of_split, numbers_of_unstack, numbers_of_transposed, numbers_of_flat,
+    numbers_of_a_list_of_rows, numbers_of_split, numbers_of_unstack, numbers_of_transposed,
+    numbers_of_ravel,
     numbers_of_atleast, measures, copy_of_a_row, chosen_rows_are_copies, product_of_rows,
     diagonal_of_numbers, rows_of_a_list, numbers_of_a_parameter, numbers_of_records,
     row_is_bound_again,
@@ -474,7 +497,7 @@ def test_what_writes_through_a_view_changes_what_it_was_given_and_is_refused(upd
     after = [x, values["v"], GAINS.copy(), LINKS.copy()]
     GAINS[:], LINKS[:] = before[2:]
     assert not all(map(np.array_equal, before, after))
-    with pytest.raises(CompileError, match="did not make|changes an element") as refusal:
+    with pytest.raises(CompileError, match=r"did not make|changes an element") as refusal:
         nlctl.compile(block(update))
     assert "test_native_purity_views.py, line" in str(refusal.value)
 
