@@ -362,9 +362,10 @@ class Expressions(ast.NodeVisitor):
     def attribute(self, base: KnownValue, name: str) -> KnownValue:
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
+        is_array = isinstance(thing, Unknown) and not (base.own or base.holds)
+        if is_array or isinstance(thing, np.ndarray):
+            return attribute_of_array(base, name)
         if isinstance(thing, Unknown | Pure):
-            if isinstance(thing, Unknown) and not (base.own or base.holds):
-                return attribute_of_array(base, name)
             is_new = base.own and (base.inside or not base.holds)
             return replace(base, own=base.inside if isinstance(thing, Pure) else is_new)
         if isinstance(thing, Instance):
@@ -375,8 +376,6 @@ class Expressions(ast.NodeVisitor):
             return made.of_parent(self.walk, thing, name)
         if isinstance(thing, OneOf):
             return least_upper_bound([self.attribute(choice, name) for choice in thing.choices])
-        if isinstance(thing, np.ndarray):
-            return attribute_of_array(base, name)
         entry = inspect.getattr_static(type(thing), name, None)
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
             self.walk.captured(type(thing), name, entry)

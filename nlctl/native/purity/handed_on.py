@@ -15,7 +15,7 @@ from .values import (
     FRESH,
     OUTSIDE,
     UNKNOWN_VALUE,
-    Arrays,
+    ArraysOf,
     Bound,
     Cached,
     Given,
@@ -62,7 +62,7 @@ def rows_of_functions(thing: object, given: Sequence[KnownValue]) -> Any:
     if thing in _OF_ONE and kept is UNKNOWN_VALUE and len(given) == 1:
         part = element(given[0])
         is_array = isinstance(part.known, Unknown | np.ndarray) and not part.holds
-        return Arrays(forgotten(part)) if is_array else kept
+        return ArraysOf(forgotten(part)) if is_array else kept
     if not (isinstance(kept, ListOf) or is_mixed) or thing not in (zip, enumerate):
         return kept
     parts = tuple(map(element, given))

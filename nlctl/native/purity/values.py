@@ -176,13 +176,13 @@ class KnownValue:
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
         kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
-        kinds |= Attributes | Arrays
+        kinds |= Attributes | ArraysOf
         known = self.known if isinstance(self.known, kinds) else id(self.known)
         return self.own, self.inside, self.holds, self.rank, known
 
 
 @dataclass(frozen=True)
-class Arrays(Unknown):
+class ArraysOf(Unknown):
     """A list or tuple that the call has made of numbers and arrays alone."""
 
     part: KnownValue
@@ -255,10 +255,10 @@ def _of_any(values: list[KnownValue]) -> Any:
     if all(isinstance(v.known, RowOf) and len(v.known.parts) == _width(first) for v in values):
         columns = zip(*(v.known.parts for v in values), strict=True)
         return RowOf(tuple(map(least_upper_bound, columns)))
-    if all(isinstance(v.known, Arrays) for v in values):
+    if all(isinstance(v.known, ArraysOf) for v in values):
         counts = {v.known.count for v in values}
         part = least_upper_bound(v.known.part for v in values)
-        return Arrays(part, counts.pop() if len(counts) == 1 else None)
+        return ArraysOf(part, counts.pop() if len(counts) == 1 else None)
     if all(isinstance(v.known, ListOf) for v in values):
         return ListOf(tuple(dict.fromkeys(c for v in values for c in v.known.choices)))
     return function_choice(values)
@@ -271,7 +271,7 @@ def _width(row: Any) -> int:
 def row(values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of a tuple of these."""
     held = holder(values)
-    if isinstance(held.known, Arrays):
+    if isinstance(held.known, ArraysOf):
         held = replace(held, known=replace(held.known, count=len(values)))
     is_mixed = isinstance(held.known, Unknown) and any(
         isinstance(function_choice([v]), OneOf) or not (v.own or v.holds) for v in values
@@ -284,7 +284,7 @@ def element(value: KnownValue) -> KnownValue:
     known = value.known
     if value.rank is not None and not value.own:
         return view(value, value.rank - 1) if value.rank > 1 else FRESH
-    if isinstance(known, Arrays):
+    if isinstance(known, ArraysOf):
         return known.part
     plain = KnownValue(value.inside, value.inside, value.holds)
     if isinstance(known, ListOf):
@@ -331,7 +331,7 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
     known = ListOf(tuple(values)) if isinstance(known, OneOf) else known
     is_index = any(isinstance(v.known, slice | None) or v.known is MAYBE_NONE for v in values)
     if known is UNKNOWN_VALUE and not is_index and not any(v.holds for v in values):
-        known = Arrays(forgotten(least_upper_bound(values)))
+        known = ArraysOf(forgotten(least_upper_bound(values)))
     return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 
 
@@ -368,7 +368,7 @@ def is_itself_alone(value: KnownValue) -> bool:
 
 def maybe_shared(value: KnownValue) -> KnownValue:
     """Return what is known of a list that may have been given what the call has not made."""
-    known = UNKNOWN_VALUE if isinstance(value.known, Arrays) else value.known
+    known = UNKNOWN_VALUE if isinstance(value.known, ArraysOf) else value.known
     return replace(value, inside=False, known=known)
 
 

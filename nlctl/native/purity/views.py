@@ -14,7 +14,7 @@ from .values import (
     FRESH,
     MAYBE_NONE,
     OUTSIDE,
-    Arrays,
+    ArraysOf,
     Given,
     KnownValue,
     Unknown,
@@ -38,13 +38,13 @@ _OF_SHAPE = ("reshape", "broadcast_to")
 _FLAT = ("ravel", "flat", "frombuffer")
 _UNKNOWN = ("asmatrix", "as_strided", "ndarray")
 VIEWS = {*_OF_SAME_RANK, *_MORE, *_AT_LEAST, *_OF_SHAPE, *_FLAT, *_UNKNOWN} - {"array", "astype"}
-NOTHING = Given()
+_NO_OTHERS = Given()
 LISTS_OF_VIEWS = {"broadcast_arrays", "split", "array_split", "hsplit", "vsplit", "dsplit",
                   "unstack", "meshgrid"}  # fmt: skip
 _MEASURES = ("shape", "size", "ndim", "dtype", "itemsize", "nbytes", "strides")  # of an array
 
 
-def viewed(name: str, base: KnownValue, how: Given = NOTHING) -> KnownValue:
+def viewed(name: str, base: KnownValue, how: Given = _NO_OTHERS) -> KnownValue:
     """Return what is known of what a function or a method of this name makes of an array."""
     listed = isinstance(base.known, list | tuple) or (base.own and base.holds)
     if listed or (name == "diag" and base.rank == 1):
@@ -84,7 +84,7 @@ def _count(how: Given) -> int | None:
         return None
     if isinstance(known[0], int | np.integer):
         return 1
-    if isinstance(known[0], Arrays):
+    if isinstance(known[0], ArraysOf):
         return known[0].count
     return len(known[0]) if isinstance(known[0], tuple) else None
 
@@ -97,7 +97,7 @@ def views_of(name: str, values: Sequence[KnownValue]) -> KnownValue:
         values = values[:1]
     if all(v.own for v in values):
         return KnownValue(True, all(v.inside for v in values), True)
-    return KnownValue(True, False, True, known=Arrays(view(OUTSIDE, greatest_rank(values))))
+    return KnownValue(True, False, True, known=ArraysOf(view(OUTSIDE, greatest_rank(values))))
 
 
 def with_objects(given: Given) -> KnownValue | None:
@@ -131,7 +131,7 @@ def indexed(
     if base.rank is None:
         return forgotten(base) if is_view or is_open else element(base)
     if is_open:  # one of them may be a tuple, and have new axes in it
-        numbers = all(isinstance(key, Arrays) for key in keys)
+        numbers = all(isinstance(key, ArraysOf) for key in keys)
         return forgotten(base) if numbers else view(base, None)
     rank = base.rank - sum(not isinstance(key, slice | type(None)) for key in keys)
     if rank > 0 or is_view:
