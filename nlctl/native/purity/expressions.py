@@ -11,10 +11,8 @@ from dataclasses import dataclass, field, replace
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
-import numpy as np
-
 from ...expressions.source import cells_of, source_file
-from . import handed_on, known_calls, made
+from . import handed_on, known_calls, made, texts
 from .captured import GONE, Captured
 from .known_calls import MEMORY
 from .parts import is_plain_attribute, names_read, part_at, part_of_one, part_of_row
@@ -39,6 +37,7 @@ from .values import (
     Unknown,
     captured,
     element,
+    has_no_truth,
     holder,
     is_itself_alone,
     least_upper_bound,
@@ -47,7 +46,7 @@ from .values import (
     one_among,
     row,
 )
-from .views import attribute_of_array, indexed
+from .views import attribute_of_array, indexed, is_array
 from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
@@ -154,7 +153,8 @@ class Expressions(ast.NodeVisitor):
         base, key = self.visit(target.value), FRESH
         if isinstance(target, ast.Subscript):
             key = self.visit(target.slice)
-        objects = base.known.choices if isinstance(base.known, OneOf) else (base,)
+        several = base.known.choices if isinstance(base.known, OneOf) else (base,)
+        objects = [thing for thing in several if thing.known is not None]
         if all(isinstance(thing.known, Instance) for thing in objects):
             for thing in objects:
                 self.write_object(target, thing, value)
@@ -227,7 +227,10 @@ class Expressions(ast.NodeVisitor):
         operator = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
         if operator is not None:
             return self.walk.function(operator, Given((value,)))
-        self.operands([value])
+        if isinstance(node.op, ast.Not):
+            self.truth(value)
+        else:
+            self.operands([value])
         return FRESH
 
     def operated(self, kind: type, left: KnownValue, right: KnownValue) -> KnownValue:
@@ -251,7 +254,12 @@ class Expressions(ast.NodeVisitor):
             known_calls.check_object(value, "computes with")
 
     def condition(self, node: ast.expr) -> None:
-        self.operands([self.visit(node)])
+        self.truth(self.visit(node))
+
+    def truth(self, value: KnownValue) -> None:
+        """Check that a value is true or false without code that is not walked."""
+        choices = value.known.choices if isinstance(value.known, OneOf) else (value,)
+        self.operands([choice for choice in choices if not has_no_truth(choice.known)])
 
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
         values = [self.visit(part) for part in (node.left, *node.comparators)]
@@ -259,7 +267,8 @@ class Expressions(ast.NodeVisitor):
             if isinstance(test, _SAME) and all(map(is_itself_alone, (left, right))):
                 self.walk.numba_differs += ["identity"]
                 return FRESH
-            self.operated(type(test), left, right)
+            if not isinstance(test, ast.Is | ast.IsNot):
+                self.operated(type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
             is_one = is_constant or isinstance(value.known, enum.Enum | type)
@@ -271,7 +280,8 @@ class Expressions(ast.NodeVisitor):
 
     def visit_BoolOp(self, node: ast.BoolOp) -> KnownValue:
         values = [self.visit(part) for part in node.values]
-        self.operands(values)
+        for value in values:
+            self.truth(value)
         return least_upper_bound(values)
 
     def decided(self, test: ast.expr) -> bool | None:
@@ -319,10 +329,13 @@ class Expressions(ast.NodeVisitor):
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
         self.walk.numba_differs += ["text"]  # numba writes numbers in other digits than Python
-        for part in ast.walk(node):
-            if isinstance(part, ast.FormattedValue):
-                self.visit(part.value)
-        return FRESH
+        return texts.joined([self.visit(part) for part in node.values])
+
+    def visit_FormattedValue(self, node: ast.FormattedValue) -> KnownValue:
+        value = self.visit(node.value)
+        if node.format_spec is not None:
+            self.visit(node.format_spec)
+        return value if node.format_spec is None and node.conversion == -1 else FRESH
 
     def visit_Subscript(self, node: ast.Subscript) -> KnownValue:
         base = self.visit(node.value)
@@ -362,8 +375,7 @@ class Expressions(ast.NodeVisitor):
     def attribute(self, base: KnownValue, name: str) -> KnownValue:
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
-        is_array = isinstance(thing, Unknown) and not (base.own or base.holds)
-        if is_array or isinstance(thing, np.ndarray):
+        if is_array(base):
             return attribute_of_array(base, name)
         if isinstance(thing, Unknown | Pure):
             is_new = base.own and (base.inside or not base.holds)
@@ -375,7 +387,8 @@ class Expressions(ast.NodeVisitor):
         if isinstance(thing, Parent):
             return made.of_parent(self.walk, thing, name)
         if isinstance(thing, OneOf):
-            return least_upper_bound([self.attribute(choice, name) for choice in thing.choices])
+            choices = [choice for choice in thing.choices if choice.known is not None]
+            return least_upper_bound([self.attribute(choice, name) for choice in choices])
         entry = inspect.getattr_static(type(thing), name, None)
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
             self.walk.captured(type(thing), name, entry)
@@ -427,7 +440,7 @@ class Expressions(ast.NodeVisitor):
             return read if function.known is getattr else FRESH
         before = self.walk.keeps
         try:
-            result = self.made_once(node, self.walk.call(function, given))
+            result = self.walk.made_once((node, self.frame), self.walk.call(function, given))
         except Message as message:
             message.place = f"{source_file(self.frame.function)}, line {node.lineno}"
             self.walk.messages.append(message)
@@ -441,17 +454,6 @@ class Expressions(ast.NodeVisitor):
         if not all(p or t for p, t in zip(plain, takes, strict=True)):
             for value in given.every:  # a list may have been given something else to keep
                 self.kept(value, [v for v in given.every if v is not value])
-        return result
-
-    def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
-        """Return one object for all that a call makes in a loop, which is walked again."""
-        if not isinstance(result.known, Instance):
-            return result
-        before = self.walk.made.get((node, self.frame))
-        if before is not None and before.known.cls is result.known.cls:
-            before.known.absorb(result.known)
-            result = replace(result, known=before.known)
-        self.walk.made[node, self.frame] = result
         return result
 
     def parent_class(self) -> KnownValue:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .texts import is_text, joined
 from .values import (
     FRESH,
     OUTSIDE,
@@ -114,6 +115,8 @@ def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of the result of an operator of numbers, arrays and containers."""
     if kind in (ast.Add, ast.Mult, ast.BitOr) and any(map(holds_others, values)):
         return KnownValue(True, False, True)  # a list or dict of what is in both
+    if kind is ast.Add and values and all(map(is_text, values)):
+        return joined(values)
     of_library = any(isinstance(v.known, Pure) for v in values)
     return KnownValue(True, True, known=Pure()) if of_library else FRESH
 

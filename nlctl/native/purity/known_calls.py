@@ -362,7 +362,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if (name, len(places)) in made.OF_ATTRIBUTES:
         return made.OF_ATTRIBUTES[name, len(places)](walk, *places)
     by_key = _by_key(walk, name, given)
-    for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
+    checked = places[:1] if name == "next" else places
+    for value in checked if name not in ("isinstance", "issubclass", "callable", "type") else ():
         if name not in _ITERATING or not iterates(walk, value):
             _check_parts(value, name, moves=by_key or name in _MOVING)
     if name == "slice":
@@ -370,9 +371,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if name == "type" and len(places) == 1:
         return made.class_of_value(places[0])
     if name in ("min", "max"):
-        return least_upper_bound(
-            [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
-        )
+        parts = [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
+        return least_upper_bound([*parts, *(v for k, v in given.names.items() if k == "default")])
     if thing is map and not isinstance(places[0].known, Unknown):
         return holder([walk.call(places[0], Given(tuple(map(element, places[1:]))))])
     if thing in MAKING:
@@ -382,7 +382,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         return KnownValue(True, inside, True, known=rows_of_functions(thing, places))
     if name == "next":
         _written(places[0], "next()")
-        return element(places[0])
+        return least_upper_bound([element(places[0]), *places[1:]])
     if thing is object:
         return KnownValue(True, True, True, known=Instance(object))
     of_number = name != "hash" or isinstance(places[0].known, (Unknown, *PLAIN))
@@ -397,7 +397,8 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
 _OPERATORS = {"len": "__len__", "abs": "__abs__"}
 _ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter", "sum", "sorted",
               "min", "max", "any", "all")  # fmt: skip
-_MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
+_MOVING = ("next", "list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter",
+           "len")  # fmt: skip
 
 
 def _by_key(walk: Walk, name: str, given: Given) -> bool:

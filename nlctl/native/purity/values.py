@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import inspect
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import EnumType, Flag
@@ -26,9 +27,22 @@ class Attributes(Unknown):
     of: KnownValue
 
 
+@dataclass(frozen=True)
+class TextLike(Unknown):
+    """A text that is only known when the function runs, and by what it is matched."""
+
+    pattern: str
+
+    @classmethod
+    def of(cls, pattern: str) -> TextLike | None:
+        """Return it by its pattern, None where that is too much to follow."""
+        return cls(pattern) if len(pattern) <= _LONGEST else None
+
+
 UNKNOWN_VALUE = Unknown()
 MAYBE_NONE = Unknown()  # None, or something else
 _RANKS = 32  # indices of an array, beyond which it is not followed
+_LONGEST = 400  # characters of a pattern of texts
 _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
@@ -176,7 +190,7 @@ class KnownValue:
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
         kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
-        kinds |= Attributes | ArraysOf
+        kinds |= Attributes | ArraysOf | TextLike
         known = self.known if isinstance(self.known, kinds) else id(self.known)
         return self.own, self.inside, self.holds, self.rank, known
 
@@ -244,8 +258,6 @@ def _of_any(values: list[KnownValue]) -> Any:
         return first
     if all(isinstance(v.known, slice) for v in values):
         return SLICE.known
-    if any(v.known in (None, MAYBE_NONE) for v in values if isinstance(v.known, Unknown | None)):
-        return MAYBE_NONE
     if all(isinstance(v.known, Instance) for v in values):
         if any(v.known.cls is not first.cls for v in values):
             return OneOf(tuple(values))
@@ -261,7 +273,13 @@ def _of_any(values: list[KnownValue]) -> Any:
         return ArraysOf(part, counts.pop() if len(counts) == 1 else None)
     if all(isinstance(v.known, ListOf) for v in values):
         return ListOf(tuple(dict.fromkeys(c for v in values for c in v.known.choices)))
-    return function_choice(values)
+    if all(isinstance(v.known, str | TextLike) for v in values):
+        texts = (v.known for v in values)
+        patterns = [re.escape(k) if isinstance(k, str) else k.pattern for k in texts]
+        return TextLike.of("|".join(dict.fromkeys(patterns))) or UNKNOWN_VALUE
+    choice = function_choice(values)
+    is_open = any(v.known is None or v.known is MAYBE_NONE for v in values)
+    return MAYBE_NONE if is_open and choice is UNKNOWN_VALUE else choice
 
 
 def _width(row: Any) -> int:
@@ -336,13 +354,11 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
 
 
 def function_choice(values: Iterable[KnownValue]) -> Any:
-    """Return the choice between functions; UNKNOWN where not all values are functions."""
+    """Return the choice between functions or objects, and None; UNKNOWN between others."""
     values = tuple(values)
     kinds = Local | Bound | Cached | OneOf | ListOf | RowOf | Instance | Pure
-    functions = all(
-        isinstance(v.known, kinds) or callable(v.known) or is_somebodys(v.known) for v in values
-    )
-    if not values or not functions:
+    given = [v.known for v in values if v.known is not None]  # None is none of them
+    if not given or not all(isinstance(k, kinds) or callable(k) or is_somebodys(k) for k in given):
         return UNKNOWN_VALUE
     flat = [c for v in values for c in (v.known.choices if isinstance(v.known, OneOf) else (v,))]
     return OneOf(tuple(dict.fromkeys(flat))) if len(flat) <= _CHOICES else UNKNOWN_VALUE
@@ -358,6 +374,13 @@ def was_there(thing: object) -> bool:
     """Whether a thing is an object of somebody's class that was there before the call."""
     kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
     return is_somebodys(thing) and not isinstance(thing, kinds)
+
+
+def has_no_truth(thing: object) -> bool:
+    """Whether a thing is true or false without code of somebody: None, or a plain object."""
+    cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    is_plain = all(getattr(cls, name, None) is None for name in ("__bool__", "__len__"))
+    return thing is None or (is_plain and (isinstance(thing, Instance) or was_there(thing)))
 
 
 def is_itself_alone(value: KnownValue) -> bool:

@@ -108,6 +108,12 @@ def with_objects(given: Given) -> KnownValue | None:
     return KnownValue(True, all(v.own and v.inside for v in given.every), True)
 
 
+def is_array(value: KnownValue) -> bool:
+    """Whether a value is an array or a number that the call has not made."""
+    is_open = isinstance(value.known, Unknown) and not (value.own or value.holds)
+    return is_open or isinstance(value.known, np.ndarray)
+
+
 def attribute_of_array(base: KnownValue, name: str) -> KnownValue:
     """Return what is known of an attribute of an array: a view of it, or what it measures."""
     if name in _MEASURES:

@@ -148,6 +148,17 @@ class Walk(ABC):
         self.objects.append(Instance(cls))
         return self.objects[-1]
 
+    def made_once(self, place: tuple[Any, Any], result: KnownValue) -> KnownValue:
+        """Return one object for all that a call makes in a loop, which is walked again."""
+        if not isinstance(result.known, Instance):
+            return result
+        before = self.made.get(place)
+        if before is not None and before.known.cls is result.known.cls:
+            before.known.absorb(result.known)
+            result = replace(result, known=before.known)
+        self.made[place] = result
+        return result
+
     def note(self, notes: Iterable[Captured]) -> None:
         """Keep notes of what a function or an object consists of."""
         for note in notes:
