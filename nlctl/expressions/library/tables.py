@@ -136,7 +136,7 @@ def _linear(
     ]  # fmt: skip
     begins = [value for value, is_wide in zip(values, wide, strict=False) if is_wide]
     pieces = zip(slopes, begins, strict=True)
-    breaks = [*places[:-1][wide], places[-1]]
+    breaks = np.append(places[:-1][wide], places[-1])
     value = interval_polynomial(graph, x, breaks, pieces) if places.size > 1 else last
     value = op("select", op("eq", x, const(float(places[-1]))), last, value)
     return beyond_ends(graph, x, (places[0], places[-1]), value, left, right)
