@@ -130,7 +130,8 @@ def _linear(
     x, last = graph.number(x), _number(graph, values[-1])
     widths = np.diff(places)
     wide = widths > 0  # where a place comes twice it jumps, to the last value there
-    slopes = np.asarray(np.diff(values))[wide] / widths[wide] if isinstance(values, np.ndarray) else [
+    is_known = isinstance(values, np.ndarray)
+    slopes = np.asarray(np.diff(values))[wide] / widths[wide] if is_known else [
         op("div", op("sub", b, a), const(float(width)))
         for (a, b), width in zip(pairwise(values), widths, strict=True) if width > 0
     ]  # fmt: skip

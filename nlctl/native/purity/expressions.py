@@ -12,9 +12,9 @@ from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
 from ...expressions.source import cells_of, source_file
-from . import handed_on, known_calls, made, texts
+from . import handed_on, known_calls, made, operators, texts
 from .captured import GONE, Captured
-from .known_calls import MEMORY
+from .checked import MEMORY, check_object
 from .parts import is_plain_attribute, names_read, part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
@@ -37,7 +37,6 @@ from .values import (
     Unknown,
     captured,
     element,
-    has_no_truth,
     holder,
     is_itself_alone,
     least_upper_bound,
@@ -50,13 +49,6 @@ from .views import attribute_of_array, indexed, is_array
 from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
-OPERATORS = {
-    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv",
-    ast.Mod: "mod", ast.Pow: "pow", ast.MatMult: "matmul", ast.BitAnd: "and", ast.BitOr: "or",
-    ast.BitXor: "xor", ast.LShift: "lshift", ast.RShift: "rshift", ast.Lt: "lt", ast.LtE: "le",
-    ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne",
-}  # fmt: skip
-_TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
 _SAME = (ast.Eq, ast.NotEq, ast.Is, ast.IsNot)
 _SIGNS = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__", ast.Not: "__bool__"}
 
@@ -220,46 +212,18 @@ class Expressions(ast.NodeVisitor):
         return value
 
     def visit_BinOp(self, node: ast.BinOp) -> KnownValue:
-        return self.operated(type(node.op), self.visit(node.left), self.visit(node.right))
+        values = [self.visit(part) for part in (node.left, node.right)]
+        return operators.operated(self.walk, type(node.op), *values)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
-        value = self.visit(node.operand)
-        operator = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
-        if operator is not None:
-            return self.walk.function(operator, Given((value,)))
+        value, name = self.visit(node.operand), _SIGNS.get(type(node.op), "")
         if isinstance(node.op, ast.Not):
-            self.truth(value)
-        else:
-            self.operands([value])
-        return FRESH
-
-    def operated(self, kind: type, left: KnownValue, right: KnownValue) -> KnownValue:
-        """Return what is known of the result of an operator, which an object's class may have."""
-        name, results, plain = OPERATORS.get(kind, ""), [], []
-        mirrored = _TURNED.get(name, f"r{name}")
-        for one, other, special in ((left, right, name), (right, left, mirrored)):
-            operator = made.operator_of(self.walk, one, f"__{special}__") if name else None
-            if operator is None:
-                plain.append(one)
-            else:
-                results.append(self.walk.function(operator, Given((one, other))))
-        if results:
-            return least_upper_bound(results)
-        self.operands(plain)
-        return handed_on.operated(kind, plain)
-
-    def operands(self, values: Sequence[KnownValue]) -> None:
-        """Check that operators are those of numbers, arrays and containers."""
-        for value in values:
-            known_calls.check_object(value, "computes with")
+            operators.truth(self.walk, value)
+            return FRESH
+        return operators.signed(self.walk, name, value)
 
     def condition(self, node: ast.expr) -> None:
-        self.truth(self.visit(node))
-
-    def truth(self, value: KnownValue) -> None:
-        """Check that a value is true or false without code that is not walked."""
-        choices = value.known.choices if isinstance(value.known, OneOf) else (value,)
-        self.operands([choice for choice in choices if not has_no_truth(choice.known)])
+        operators.truth(self.walk, self.visit(node))
 
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
         values = [self.visit(part) for part in (node.left, *node.comparators)]
@@ -267,8 +231,10 @@ class Expressions(ast.NodeVisitor):
             if isinstance(test, _SAME) and all(map(is_itself_alone, (left, right))):
                 self.walk.numba_differs += ["identity"]
                 return FRESH
-            if not isinstance(test, ast.Is | ast.IsNot):
-                self.operated(type(test), left, right)
+            if isinstance(test, ast.In | ast.NotIn):
+                operators.contains(self.walk, right, left)
+            elif not isinstance(test, ast.Is | ast.IsNot):
+                operators.operated(self.walk, type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
             is_one = is_constant or isinstance(value.known, enum.Enum | type)
@@ -281,7 +247,7 @@ class Expressions(ast.NodeVisitor):
     def visit_BoolOp(self, node: ast.BoolOp) -> KnownValue:
         values = [self.visit(part) for part in node.values]
         for value in values:
-            self.truth(value)
+            operators.truth(self.walk, value)
         return least_upper_bound(values)
 
     def decided(self, test: ast.expr) -> bool | None:
@@ -366,7 +332,7 @@ class Expressions(ast.NodeVisitor):
                 return captured(base.known[key])
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
-        self.operands([base])
+        operators.operands([base])
         return indexed(base, indices, values)
 
     def visit_Attribute(self, node: ast.Attribute) -> KnownValue:
@@ -493,5 +459,5 @@ class Expressions(ast.NodeVisitor):
 
     def iterated(self, value: KnownValue) -> None:
         # whatever is in a list is only handed on
-        if not isinstance(value.known, ListOf) and not known_calls.iterates(self.walk, value):
-            known_calls.check_object(value, "goes through")
+        if not isinstance(value.known, ListOf) and not made.iterates(self.walk, value):
+            check_object(value, "goes through")

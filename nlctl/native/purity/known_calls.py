@@ -9,18 +9,19 @@ import inspect
 import logging
 import re
 import warnings
-from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, namedtuple
+from collections import ChainMap, defaultdict, namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
-from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
+from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
-from . import made
+from . import made, operators
 from . import method_names as named
+from .checked import HOLDERS, MEMORY, check_object
 from .handed_on import handed_on, result_of_reduce, rows_of_functions, written_places
 from .values import (
     FRESH,
@@ -40,7 +41,6 @@ from .values import (
     OneOf,
     Parent,
     Pure,
-    RowOf,
     Unknown,
     captured,
     element,
@@ -56,7 +56,6 @@ from .values import (
 from .views import LISTS_OF_VIEWS, VIEWS, viewed, viewed_by_function, views_of, with_objects
 from .walk import Walk
 
-MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
 _RECORD = "make what it records an output of the block, what it reads again a state"
 DRAW = "draw the values before the run and give them as an input"
@@ -69,7 +68,6 @@ _SEEDED = ("default_rng", "RandomState")
 CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | frozenset | str
               | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
-HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
 _OF_TUPLES = [getattr(namedtuple("_", ""), n).__code__ for n in ("_replace", "_asdict")]
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
@@ -312,59 +310,18 @@ def _written(base: KnownValue, what: str, advice: str = MEMORY) -> None:
         raise Impure(f"changes with {what} what it did not make", advice)
 
 
-_WITHOUT_CODE = (
-    Unknown
-    | Local
-    | Bound
-    | Cached
-    | Pure
-    | RowOf
-    | enum.Enum
-    | enum.EnumType
-    | BuiltinFunctionType
-)
-
-
-def iterates(walk: Walk, value: KnownValue) -> bool:
-    """Walk the method of somebody's class that goes through an object; return if there is one."""
-    method = made.operator_of(walk, value, "__iter__")
-    if method is not None:
-        walk.function(method, Given((value,)))
-    return method is not None
-
-
-def check_object(value: KnownValue, what: str) -> None:
-    """Check that what a value does by itself is known: no iterator, no class of somebody."""
-    thing = value.known
-    if isinstance(thing, _WITHOUT_CODE) or type(thing) in HOLDERS:
-        return
-    if isinstance(thing, OneOf | ListOf):
-        for choice in thing.choices:
-            check_object(choice, what)
-        return
-    if isinstance(thing, Instance):
-        if issubclass(thing.cls, tuple) and "__iter__" not in vars(thing.cls):
-            return
-        raise Impure(f"{what} an object of type {thing.cls.__name__}", "use arrays")
-    if isinstance(thing, tuple) and hasattr(thing, "_fields"):
-        return
-    if not value.own and hasattr(type(thing), "__next__"):
-        raise Impure(f"uses up {type(thing).__name__}, which it did not make", MEMORY)
-    if library(type(thing)) is None:
-        raise Impure(f"{what} an object of type {type(thing).__name__}", "use arrays")
-
-
 def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     name, places = thing.__name__, given.places
-    operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
-    if operator is not None:
-        return walk.function(operator, Given(places))
+    result = operators.of_builtin(walk, name, places)
+    if result is not None:
+        return result
     if (name, len(places)) in made.OF_ATTRIBUTES:
         return made.OF_ATTRIBUTES[name, len(places)](walk, *places)
     by_key = _by_key(walk, name, given)
-    checked = places[:1] if name == "next" else places
+    is_ordered = not by_key and bool(places) and operators.ordered(walk, name, places)
+    checked = () if is_ordered else places[:1] if name == "next" else places
     for value in checked if name not in ("isinstance", "issubclass", "callable", "type") else ():
-        if name not in _ITERATING or not iterates(walk, value):
+        if name not in _ITERATING or not made.iterates(walk, value):
             _check_parts(value, name, moves=by_key or name in _MOVING)
     if name == "slice":
         return SLICE
@@ -394,7 +351,6 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     raise Impure(f"calls {name}()", OUTPUT if name in ("input", "open") else "do without it")
 
 
-_OPERATORS = {"len": "__len__", "abs": "__abs__"}
 _ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter", "sum", "sorted",
               "min", "max", "any", "all")  # fmt: skip
 _MOVING = ("next", "list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter",

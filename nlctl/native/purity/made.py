@@ -280,6 +280,14 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
     return function
 
 
+def iterates(walk: Walk, value: KnownValue) -> bool:
+    """Walk the method of somebody's class that goes through an object; return if there is one."""
+    method = operator_of(walk, value, "__iter__")
+    if method is not None:
+        walk.function(method, Given((value,)))
+    return method is not None
+
+
 def asks_what_is_there(function: object, places: Sequence[KnownValue]) -> bool:
     """Whether ``hasattr`` asks for something that an object certainly has."""
     thing, name = (*(value.known for value in places), None, None)[:2]

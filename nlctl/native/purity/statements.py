@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from ...expressions.source import Definition, Unreadable, definition
-from . import made
-from .expressions import CHANGES, OPERATORS, Expressions, Frame
-from .known_calls import CONTAINERS, MEMORY
+from . import made, operators
+from .checked import MEMORY
+from .expressions import CHANGES, Expressions, Frame
+from .known_calls import CONTAINERS
 from .local_classes import class_defined_in, constants_in_class
 from .values import (
     FRESH,
@@ -142,11 +143,11 @@ class CallWalker(Expressions):
         self, node: ast.AugAssign, value: KnownValue, added: KnownValue
     ) -> KnownValue:
         """Return what an object becomes by ``+=`` and its kind."""
-        name = OPERATORS.get(type(node.op), "")
+        name = operators.OPERATORS.get(type(node.op), "")
         operator = made.operator_of(self.walk, value, f"__i{name}__")
         if operator is not None:
             return self.walk.function(operator, Given((value, added)))
-        return self.operated(type(node.op), value, added)
+        return operators.operated(self.walk, type(node.op), value, added)
 
     def visit_Delete(self, node: ast.Delete) -> None:
         for target in node.targets:
