@@ -69,6 +69,17 @@ _OVERFLOWING = ("exp", "expm1", "exp2", "sinh", "cosh")
 _UNSETTLED = ("power", "hypot")
 
 
+def _number_of(value: Any, name: str, kind: str) -> Any:
+    """Return the number that an object's class makes of it, where that depends on the state."""
+    method = getattr(type(value), name, None)
+    number = method(value) if isinstance(method, FunctionType) else None
+    if not isinstance(number, Tracer):
+        return value
+    if number.shape or number.only.kind != kind:
+        raise Untraceable(f"'{name}' of an object returns something else")
+    return number
+
+
 def guard_whole(graph: Graph, value: Tracer) -> None:
     """Note that Python makes no integer of NaN or infinity."""
     op = functools.partial(elementwise, graph)
@@ -113,6 +124,7 @@ class Builtins:
         return text_of(lambda: of_numbers(*given), *((v, "") for v in given))
 
     def _float(self, value: Any = 0.0) -> Any:
+        value = _number_of(value, "__float__", "f")
         if not isinstance(value, Tracer):
             return float(value)
         only = _single(value)
@@ -124,6 +136,7 @@ class Builtins:
         return WRITTEN[complex](self.graph, *parts)
 
     def _int(self, value: Any = 0, *rest: Any) -> Any:
+        value = _number_of(value, "__int__", "i")
         if not isinstance(value, Tracer):
             return int(value, *rest)
         only = _single(value)

@@ -308,8 +308,9 @@ def element(value: KnownValue) -> KnownValue:
     if isinstance(known, ListOf):
         return least_upper_bound(known.choices)
     if isinstance(known, OneOf):
-        inner = [element(c) for c in known.choices if isinstance(c.known, list | tuple)]
-        if len(inner) == len(known.choices):
+        lists = [c for c in known.choices if isinstance(c.known, list | tuple)]
+        inner = [element(c) for c in lists if c.known]  # of an empty one there is none
+        if inner and len(lists) == len(known.choices):
             return replace(plain, known=_of_any(inner))
         return least_upper_bound([plain, *inner]) if inner else replace(plain, known=known)
     if isinstance(known, Pure):
