@@ -218,12 +218,12 @@ class Expressions(ast.NodeVisitor):
     def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
         value, name = self.visit(node.operand), _SIGNS.get(type(node.op), "")
         if isinstance(node.op, ast.Not):
-            operators.truth(self.walk, value)
+            operators.tested(self.walk, value)
             return FRESH
         return operators.signed(self.walk, name, value)
 
     def condition(self, node: ast.expr) -> None:
-        operators.truth(self.walk, self.visit(node))
+        operators.tested(self.walk, self.visit(node))
 
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
         values = [self.visit(part) for part in (node.left, *node.comparators)]
@@ -238,6 +238,7 @@ class Expressions(ast.NodeVisitor):
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
             is_one = is_constant or isinstance(value.known, enum.Enum | type)
+            is_one |= value.known is NotImplemented
             if is_one and isinstance(part, ast.Constant) and part.value is not None:
                 self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
             if isinstance(test, ast.Is | ast.IsNot) and not is_one:
@@ -247,7 +248,7 @@ class Expressions(ast.NodeVisitor):
     def visit_BoolOp(self, node: ast.BoolOp) -> KnownValue:
         values = [self.visit(part) for part in node.values]
         for value in values:
-            operators.truth(self.walk, value)
+            operators.tested(self.walk, value)
         return least_upper_bound(values)
 
     def decided(self, test: ast.expr) -> bool | None:
@@ -357,13 +358,7 @@ class Expressions(ast.NodeVisitor):
             return least_upper_bound([self.attribute(choice, name) for choice in choices])
         entry = inspect.getattr_static(type(thing), name, None)
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
-            self.walk.captured(type(thing), name, entry)
-            getter = entry.fget if isinstance(entry, property) else entry.func
-            if isinstance(entry, functools.cached_property):
-                self.walk.captured(vars(thing), name, getattr(thing, name, None))
-                return self.walk.first_call(captured(getter), Given((base,)))
-            result = self.walk.call(captured(getter), Given((base,)))
-            return result if not result.own else FRESH
+            return self.computed(base, name, entry)
         if isinstance(entry, functools._lru_cache_wrapper):
             self.walk.captured(type(thing), name, entry)
             return made.of_class(self.walk, base, entry)
@@ -381,6 +376,17 @@ class Expressions(ast.NodeVisitor):
                 return captured(value)  # a part of a table that is noted
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
+
+    def computed(
+        self, base: KnownValue, name: str, entry: property | functools.cached_property[Any]
+    ) -> KnownValue:
+        """Return what is known of what a property of an object that was there before returns."""
+        self.walk.captured(type(base.known), name, entry)
+        if isinstance(entry, functools.cached_property):
+            self.walk.captured(vars(base.known), name, getattr(base.known, name, None))
+            return self.walk.first_call(captured(entry.func), Given((base,)))
+        result = self.walk.call(captured(entry.fget), Given((base,)))
+        return result if not result.own else FRESH
 
     def visit_Call(self, node: ast.Call) -> KnownValue:
         places = tuple(self.visit(part) for part in node.args)

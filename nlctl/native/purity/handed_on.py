@@ -111,7 +111,7 @@ def holds_others(value: KnownValue) -> bool:
     return is_container and not value.inside
 
 
-def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
+def result_of_plain(kind: type, values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of the result of an operator of numbers, arrays and containers."""
     if kind in (ast.Add, ast.Mult, ast.BitOr) and any(map(holds_others, values)):
         return KnownValue(True, False, True)  # a list or dict of what is in both

@@ -55,6 +55,8 @@ def operated(walk: Walk, kind: type, left: KnownValue, right: KnownValue) -> Kno
     mirrored = _TURNED.get(name, f"r{name}")
     for one, other, special in ((left, right, name), (right, left, mirrored)):
         operator = operator_of(walk, one, f"__{special}__") if name else None
+        if operator is None and special == "ne":  # by default it is what == is not
+            operator = operator_of(walk, one, "__eq__")
         if operator is None:
             plain.append(one)
         else:
@@ -62,7 +64,7 @@ def operated(walk: Walk, kind: type, left: KnownValue, right: KnownValue) -> Kno
     if results:
         return least_upper_bound(results)
     operands(plain)
-    return handed_on.operated(kind, plain)
+    return handed_on.result_of_plain(kind, plain)
 
 
 def signed(walk: Walk, name: str, value: KnownValue) -> KnownValue:
@@ -77,7 +79,7 @@ def signed(walk: Walk, name: str, value: KnownValue) -> KnownValue:
     return least_upper_bound(results)
 
 
-def truth(walk: Walk, value: KnownValue) -> None:
+def tested(walk: Walk, value: KnownValue) -> None:
     """Walk what an object's class does to say whether it is true."""
     for choice in choices_of(value):
         if not has_no_truth(choice.known) and of_builtin(walk, "bool", [choice]) is None:
