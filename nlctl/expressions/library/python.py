@@ -72,7 +72,8 @@ _UNSETTLED = ("power", "hypot")
 def _number_of(value: Any, name: str, kind: str) -> Any:
     """Return the number that an object's class makes of it, where that depends on the state."""
     method = getattr(type(value), name, None)
-    number = method(value) if isinstance(method, FunctionType) else None
+    is_objects = isinstance(method, FunctionType) and not isinstance(value, Tracer)
+    number = method(value) if is_objects else None
     if not isinstance(number, Tracer):
         return value
     if number.shape or number.only.kind != kind:

@@ -375,7 +375,19 @@ class Expressions(ast.NodeVisitor):
             if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):
                 return captured(value)  # a part of a table that is noted
             return self.walk.captured(thing, name, value)
-        raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
+        return self.searched_for(base, name)
+
+    def searched_for(self, base: KnownValue, name: str) -> KnownValue:
+        """Return what is known of an attribute that an object's ``__getattr__`` finds."""
+        cls = type(base.known)
+        finder = inspect.getattr_static(cls, "__getattr__", None)
+        is_missing = inspect.getattr_static(base.known, name, GONE) is GONE
+        if not isinstance(finder, FunctionType) or not is_missing or library(cls) is not None:
+            raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
+        holders = [cls, *([vars(base.known)] if hasattr(base.known, "__dict__") else [])]
+        self.walk.note([Captured(holder, name, GONE) for holder in holders])
+        self.walk.captured(cls, "__getattr__", finder)
+        return self.walk.function(finder, Given((base, captured(name))))
 
     def computed(
         self, base: KnownValue, name: str, entry: property | functools.cached_property[Any]
