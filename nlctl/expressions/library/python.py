@@ -72,8 +72,9 @@ _UNSETTLED = ("power", "hypot")
 def _number_of(value: Any, name: str, kind: str) -> Any:
     """Return the number that an object's class makes of it, where that depends on the state."""
     method = getattr(type(value), name, None)
-    is_objects = isinstance(method, FunctionType) and not isinstance(value, Tracer)
-    number = method(value) if is_objects else None
+    if isinstance(value, Tracer) or not isinstance(method, FunctionType):
+        return value
+    number = method(value)
     if not isinstance(number, Tracer):
         return value
     if number.shape or number.only.kind != kind:
@@ -262,6 +263,8 @@ class Builtins:
         key = options.pop("key", None)
         if values:
             options.pop("default", None)
+        elif "default" not in options:
+            raise catchable(ValueError)
         keys = [v if key is None else key(v) for v in values]
         if not any(map(_holds_traced, (*values, *keys))):
             return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)
@@ -297,6 +300,10 @@ def copied(graph: Graph, value: Any, memo: object = None) -> Any:
         return type(value)(copied(graph, v) for v in value)
     if type(value) is dict:
         return {k: copied(graph, v) for k, v in value.items()}
+    if isinstance(value, float | int | str | bytes | NoneType | np.generic):
+        return value
+    if type(value) is np.ndarray and value.dtype == float:
+        return traced(graph, value).copy()
     raise Untraceable(f"a copy of {type(value).__name__}")
 
 

@@ -6,6 +6,7 @@ import ast
 import enum
 import functools
 import inspect
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from types import BuiltinFunctionType, FunctionType, ModuleType
@@ -418,6 +419,8 @@ class Expressions(ast.NodeVisitor):
         given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
+        if function.known is operator.attrgetter:
+            return self.reader_of(places)
         if function.known is getattr or made.asks_what_is_there(function.known, places):
             names, others = names_read(*places)
             read = least_upper_bound([*(self.attribute(places[0], n) for n in names), *others])
@@ -439,6 +442,15 @@ class Expressions(ast.NodeVisitor):
             for value in given.every:  # a list may have been given something else to keep
                 self.kept(value, [v for v in given.every if v is not value])
         return result
+
+    def reader_of(self, names: Sequence[KnownValue]) -> KnownValue:
+        """Return the function that `operator.attrgetter` makes: it reads attributes by names."""
+        if not all(isinstance(name.known, str) for name in names):
+            raise Impure("calls attrgetter() by a name that is only known when it runs", "write it")
+        read = [f"one.{name.known}" for name in names]
+        text = f"lambda one: ({', '.join(read)})" if len(read) > 1 else f"lambda one: {read[0]}"
+        tree = ast.parse(text, mode="eval").body
+        return self.visit(ast.increment_lineno(tree, self.line - 1))
 
     def parent_class(self) -> KnownValue:
         """Return what ``super()`` stands for."""

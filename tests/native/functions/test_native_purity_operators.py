@@ -1,7 +1,9 @@
 """What operators and functions of Python ask the classes of objects; attributes that are found."""
 
+import copy
 import functools
 import math
+import operator
 
 import control as ct
 import numpy as np
@@ -123,6 +125,12 @@ class Restless:
         return self.grown() > 3
 
 
+def first_of(values):
+    first, *others = values
+    return first + 0.1 * len(others)
+
+
+JOBS = [Job(1.0, 2.0), Job(3.0, 0.5)]
 ROW, VALUES, RESTLESS = Row([1.0, 2.0, 0.5]), Values({"k": 2.0, "c": 0.3}), Restless()
 LEGAL = {
     "float": lambda t, x, u, p: [float(Amount(x[0])) - x[0] * 2],
@@ -141,6 +149,18 @@ LEGAL = {
     "reversed": lambda t, x, u, p: [sum(k * a for k, a in enumerate(reversed(ROW))) - x[0]],
     "found by names": lambda t, x, u, p: [Named(x).speed, -Named(x).position],
     "found in a dict": lambda t, x, u, p: [x[1], -VALUES.k * x[0] - VALUES.c * x[1]],
+}
+TIMES = {0.0: 1.0, 0.2: -1.0, 0.4: 2.0}
+LEGAL |= {
+    "attributes by names": lambda t, x, u, p: [
+        sum(f * v for f, v in map(operator.attrgetter("force", "urgency"), JOBS)) - x[0]
+    ],
+    "order by an attribute": lambda t, x, u, p: [
+        max(JOBS, key=operator.attrgetter("urgency")).force - x[0]
+    ],
+    "greatest that is left": lambda t, x, u, p: [TIMES[max(k for k in TIMES if k <= t)] - x[0]],
+    "first that is left": lambda t, x, u, p: [first_of([v for k, v in TIMES.items() if k <= t])],
+    "copy of a dict of numbers": lambda t, x, u, p: [copy.deepcopy({**TIMES, 0.0: x[1]})[0.0]],
 }
 REFUSED = {
     "float": lambda t, x, u, p: [-x[0] * float(RESTLESS)],
