@@ -312,7 +312,7 @@ def _written(base: KnownValue, what: str, advice: str = MEMORY) -> None:
 
 def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     name, places = thing.__name__, given.places
-    result = operators.of_builtin(walk, name, places)
+    result = operators.of_builtin(walk, name, places, given.names.get("start", captured(0)))
     if result is not None:
         return result
     if (name, len(places)) in made.OF_ATTRIBUTES:
@@ -440,7 +440,7 @@ def _call_functions(walk: Walk, values: Any, part: KnownValue = OUTSIDE) -> None
     """Walk functions that are handed on: they will be called with anything."""
     for value in values:
         thing = value.known
-        if isinstance(thing, Unknown | type | Pure):
+        if isinstance(thing, Unknown | type | Pure) or not made.may_be_called(thing):
             continue
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices, part)

@@ -286,11 +286,22 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
 
 
 def iterates(walk: Walk, value: KnownValue) -> bool:
-    """Walk the method of somebody's class that goes through an object; return if there is one."""
+    """Walk the methods of somebody's class that go through an object; return if there are any."""
     method = operator_of(walk, value, "__iter__")
-    if method is not None:
-        walk.function(method, Given((value,)))
-    return method is not None
+    if method is None:
+        return False
+    result = walk.function(method, Given((value,)))
+    choices = result.known.choices if isinstance(result.known, OneOf) else (result,)
+    for choice in choices:
+        following = operator_of(walk, choice, "__next__")
+        if following is not None:
+            walk.function(following, Given((choice,)))
+    return True
+
+
+def may_be_called(thing: object) -> bool:
+    """Whether a thing is no object that the call has made, or one whose class says what it does."""
+    return not isinstance(thing, Instance) or any("__call__" in vars(c) for c in thing.cls.__mro__)
 
 
 def asks_what_is_there(function: object, places: Sequence[KnownValue]) -> bool:

@@ -7,6 +7,7 @@ from . import handed_on
 from .checked import check_object
 from .made import iterates, operator_of
 from .values import (
+    FRESH,
     PLAIN,
     Given,
     Instance,
@@ -14,6 +15,7 @@ from .values import (
     OneOf,
     captured,
     element,
+    forgotten,
     has_no_truth,
     least_upper_bound,
     was_there,
@@ -30,8 +32,9 @@ _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne
 _OF_BUILTINS = {
     "len": ("__len__",), "abs": ("__abs__",), "round": ("__round__",), "float": ("__float__",),
     "int": ("__int__", "__index__", "__trunc__"), "reversed": ("__reversed__",),
-    "bool": ("__bool__", "__len__"),
+    "bool": ("__bool__", "__len__"), "iter": ("__iter__",), "next": ("__next__",),
 }  # fmt: skip
+_NOTHING = captured(0)  # where a sum starts
 _PASSES = 4  # of a sum, after which what is known of it is what it was
 
 
@@ -92,35 +95,41 @@ def contains(walk: Walk, base: KnownValue, part: KnownValue) -> None:
         operator = operator_of(walk, choice, "__contains__")
         if operator is not None:
             walk.function(operator, Given((choice, part)))
-        elif not iterates(walk, choice):
-            operands([choice, part])
+        else:  # each part of it is compared
+            iterates(walk, choice)
+            operands([part] if isinstance(choice.known, Instance) else [choice, part])
 
 
-def of_builtin(walk: Walk, name: str, places: Sequence[KnownValue]) -> KnownValue | None:
+def of_builtin(
+    walk: Walk, name: str, places: Sequence[KnownValue], start: KnownValue = _NOTHING
+) -> KnownValue | None:
     """Return what is known of what a function of Python's own asks an object's class."""
     if not places or name not in (*_OF_BUILTINS, "sum"):
         return None
     if name == "sum":
-        return _sum(walk, places)
+        return _sum(walk, places[0], places[1] if len(places) > 1 else start)
     results = []
     for choice in choices_of(places[0]):
         every = (operator_of(walk, choice, special) for special in _OF_BUILTINS[name])
         operator = next((one for one in every if one is not None), None)
         if operator is None:
             return None
-        results.append(walk.function(operator, Given((choice, *places[1:]))))
-    return least_upper_bound(results)
+        others = () if name == "next" else places[1:]
+        results.append(walk.function(operator, Given((choice, *others))))
+    return least_upper_bound([*results, *(places[1:] if name == "next" else ())])
 
 
 def _is_object(value: KnownValue) -> bool:
     return all(isinstance(v.known, Instance) or was_there(v.known) for v in choices_of(value))
 
 
-def _sum(walk: Walk, places: Sequence[KnownValue]) -> KnownValue | None:
-    """Return what is known of the sum of objects; None of anything else."""
-    part, start = element(places[0]), places[1] if len(places) > 1 else captured(0)
-    if not _is_object(part):
-        return None
+def _sum(walk: Walk, over: KnownValue, start: KnownValue) -> KnownValue | None:
+    """Return what is known of a sum of objects, or of one that may be where it starts."""
+    part = element(over)
+    if not (_is_object(part) or _is_object(start)):
+        is_plain = start.own and start.inside
+        return None if is_plain else least_upper_bound([FRESH, forgotten(start)])
+    iterates(walk, over)
     totals = [start]
     for _ in range(_PASSES):
         totals.append(operated(walk, ast.Add, totals[-1], part))

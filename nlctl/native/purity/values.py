@@ -378,10 +378,12 @@ def was_there(thing: object) -> bool:
 
 
 def has_no_truth(thing: object) -> bool:
-    """Whether a thing is true or false without code of somebody: None, or a plain object."""
+    """Whether a thing is true or false without code of somebody: None, a list, a plain object."""
     cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    if thing is None or isinstance(thing, ListOf | RowOf):
+        return True
     is_plain = all(getattr(cls, name, None) is None for name in ("__bool__", "__len__"))
-    return thing is None or (is_plain and (isinstance(thing, Instance) or was_there(thing)))
+    return is_plain and (isinstance(thing, Instance) or was_there(thing))
 
 
 def is_itself_alone(value: KnownValue) -> bool:

@@ -124,12 +124,40 @@ class Restless:
     def __lt__(self, other):
         return self.grown() > 3
 
+    def __radd__(self, other):
+        return self.grown()
+
+
+class Logging(Counted):
+    """An iterator that counts how often all of its kind are asked."""
+
+    def __init__(self):
+        super().__init__(2)
+
+    def __next__(self):
+        LOG[0] += 1.0
+        return super().__next__() * LOG[0]
+
+
+class Rows:
+    def __init__(self, x):
+        self.x = x
+
+    def __iter__(self):
+        return iter(self.x.reshape(2, 1))
+
+
+def doubled(values):
+    values *= 2.0
+    return values
+
 
 def first_of(values):
     first, *others = values
     return first + 0.1 * len(others)
 
 
+LOG = [0.0]
 JOBS = [Job(1.0, 2.0), Job(3.0, 0.5)]
 ROW, VALUES, RESTLESS = Row([1.0, 2.0, 0.5]), Values({"k": 2.0, "c": 0.3}), Restless()
 LEGAL = {
@@ -160,6 +188,11 @@ LEGAL |= {
     ],
     "greatest that is left": lambda t, x, u, p: [TIMES[max(k for k in TIMES if k <= t)] - x[0]],
     "first that is left": lambda t, x, u, p: [first_of([v for k, v in TIMES.items() if k <= t])],
+    "objects that are left": lambda t, x, u, p: [
+        (near[0].force if (near := [job for job in JOBS if job.urgency < 2 + t]) else 1.0) - x[0]
+    ],
+    "next": lambda t, x, u, p: [-next(iter(Counted(2))) * x[0] + next(Counted(0), 1.0)],
+    "list": lambda t, x, u, p: [-sum(list(Counted(3))) * x[0]],
     "copy of a dict of numbers": lambda t, x, u, p: [copy.deepcopy({**TIMES, 0.0: x[1]})[0.0]],
 }
 REFUSED = {
@@ -168,6 +201,13 @@ REFUSED = {
     "in": lambda t, x, u, p: [-x[0] if 1.0 in RESTLESS else x[0]],
     "min": lambda t, x, u, p: [-x[0] if min(RESTLESS, RESTLESS) is None else x[0]],
     "attribute": lambda t, x, u, p: [-x[0] * RESTLESS.gain],
+    "start of a sum": lambda t, x, u, p: [-x[0] * sum([1.0], start=RESTLESS)],
+    "sum of nothing": lambda t, x, u, p: -doubled(sum([], x)),
+    "rows": lambda t, x, u, p: -doubled(list(Rows(x))[0]),
+    "loop": lambda t, x, u, p: [-x[0] * sum(k for k in Logging())],
+    "list": lambda t, x, u, p: [-x[0] * list(Logging())[0]],
+    "next": lambda t, x, u, p: [-x[0] * next(Logging())],
+    "taken apart": lambda t, x, u, p: [-x[0] * k for k in [*Logging()]],
 }
 
 
