@@ -300,7 +300,7 @@ def iterates(walk: Walk, value: KnownValue) -> bool:
 
 
 def may_be_called(thing: object) -> bool:
-    """Whether a thing is no object that the call has made, or one whose class says what it does."""
+    """Whether a thing may be called: of objects that the call has made, by their classes."""
     return not isinstance(thing, Instance) or any("__call__" in vars(c) for c in thing.cls.__mro__)
 
 

@@ -203,9 +203,9 @@ REFUSED = {
     "attribute": lambda t, x, u, p: [-x[0] * RESTLESS.gain],
     "start of a sum": lambda t, x, u, p: [-x[0] * sum([1.0], start=RESTLESS)],
     "sum of nothing": lambda t, x, u, p: -doubled(sum([], x)),
-    "rows": lambda t, x, u, p: -doubled(list(Rows(x))[0]),
+    "rows": lambda t, x, u, p: -doubled(list(Rows(x))[1]),
     "loop": lambda t, x, u, p: [-x[0] * sum(k for k in Logging())],
-    "list": lambda t, x, u, p: [-x[0] * list(Logging())[0]],
+    "list": lambda t, x, u, p: [-x[0] * list(Logging())[1]],
     "next": lambda t, x, u, p: [-x[0] * next(Logging())],
     "taken apart": lambda t, x, u, p: [-x[0] * k for k in [*Logging()]],
 }
