@@ -393,6 +393,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
         raise Impure(f"calls {name}, which reads or writes files", _FILES)
     if name in _OTHERS and (module, name) != ("json", "loads"):  # which takes a text apart
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
+    asked, given = given, operators.with_arrays(walk, given, module)
     arrays = module.startswith(("numpy", "scipy")) and all(map(_holds_numbers, given.every))
     _call_functions(walk, given.every, VECTOR if arrays else OUTSIDE)
     for value in given.every:
@@ -412,6 +413,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     for value, how in written_places(thing, name, given):
         _written(value, f"{name}(..., {how})")
     may_be_it = given.names.get("copy", captured(True)).known is not True
+    may_be_it |= name == "array" and given.places != asked.places  # which an object may not copy
     if name == "nan_to_num" and may_be_it:
         _written(given.places[0], f"{name}()")
     if name in LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):

@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Sequence
 
+from ...expressions.protocols import array_protocol
 from . import handed_on
 from .checked import check_object
 from .made import iterates, operator_of
@@ -117,6 +118,31 @@ def of_builtin(
         others = () if name == "next" else places[1:]
         results.append(walk.function(operator, Given((choice, *others))))
     return least_upper_bound([*results, *(places[1:] if name == "next" else ())])
+
+
+def with_arrays(walk: Walk, given: Given, module: str) -> Given:
+    """Return arguments of a function with the arrays that it makes of objects, if it is NumPy's."""
+    if not module.startswith("numpy"):
+        return given
+    names = {k: _as_array(walk, v) for k, v in given.names.items()}
+    return Given(tuple(_as_array(walk, v) for v in given.places), names)
+
+
+def _as_array(walk: Walk, value: KnownValue) -> KnownValue:
+    """Return what is known of the array that NumPy makes of an object, of others the same."""
+    thing = value.known
+    cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    methods = array_protocol(cls) if _is_object(value) and not isinstance(thing, OneOf) else ()
+    results = []
+    for name in methods:
+        method = operator_of(walk, value, name)
+        if method is None:
+            return value
+        others = (FRESH,) if name == "__getitem__" else ()
+        results.append(walk.function(method, Given((value, *others))))
+    if not results:
+        return value
+    return results[0] if methods == ("__array__",) else FRESH
 
 
 def _is_object(value: KnownValue) -> bool:

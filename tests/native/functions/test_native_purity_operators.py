@@ -128,6 +128,44 @@ class Restless:
         return self.grown()
 
 
+class Vector:
+    def __init__(self, *parts):
+        self.parts = np.array(parts)
+
+    def __array__(self, dtype=None, copy=None):
+        return self.parts
+
+
+class Pair:
+    def __init__(self, *parts):
+        self.parts = parts
+
+    def __len__(self):
+        return len(self.parts)
+
+    def __getitem__(self, k):
+        return self.parts[k]
+
+
+class Held(Vector):
+    def __init__(self, parts):
+        self.parts = parts
+
+
+def shared_array(t, x, u, p):
+    vector = Vector(*x)
+    as_it_is, left_to_it = np.asarray(vector), np.array(vector)
+    as_it_is[0] = 3.0 * x[1]
+    left_to_it[1] += 1.0  # of which it makes no copy, so that NumPy has none either
+    return -vector.parts
+
+
+def array_of_the_state(t, x, u, p):
+    whole = np.array(Held(x))
+    whole[0] = 1.0
+    return -x
+
+
 class Logging(Counted):
     """An iterator that counts how often all of its kind are asked."""
 
@@ -157,7 +195,7 @@ def first_of(values):
     return first + 0.1 * len(others)
 
 
-LOG = [0.0]
+LOG, UNITS = [0.0], Vector(1.0, 0.5)
 JOBS = [Job(1.0, 2.0), Job(3.0, 0.5)]
 ROW, VALUES, RESTLESS = Row([1.0, 2.0, 0.5]), Values({"k": 2.0, "c": 0.3}), Restless()
 LEGAL = {
@@ -193,6 +231,9 @@ LEGAL |= {
     ],
     "next": lambda t, x, u, p: [-next(iter(Counted(2))) * x[0] + next(Counted(0), 1.0)],
     "list": lambda t, x, u, p: [-sum(list(Counted(3))) * x[0]],
+    "array": lambda t, x, u, p: -np.array(Vector(*x)) + np.asarray(UNITS),
+    "array that is shared": shared_array,
+    "array of a list": lambda t, x, u, p: -np.array(Pair(x[1], x[0])) + np.array(Pair(1.0, 2.0)),
     "copy of a dict of numbers": lambda t, x, u, p: [copy.deepcopy({**TIMES, 0.0: x[1]})[0.0]],
 }
 REFUSED = {
@@ -202,6 +243,7 @@ REFUSED = {
     "min": lambda t, x, u, p: [-x[0] if min(RESTLESS, RESTLESS) is None else x[0]],
     "attribute": lambda t, x, u, p: [-x[0] * RESTLESS.gain],
     "start of a sum": lambda t, x, u, p: [-x[0] * sum([1.0], start=RESTLESS)],
+    "array": array_of_the_state,
     "sum of nothing": lambda t, x, u, p: -doubled(sum([], x)),
     "rows": lambda t, x, u, p: -doubled(list(Rows(x))[1]),
     "loop": lambda t, x, u, p: [-x[0] * sum(k for k in Logging())],
