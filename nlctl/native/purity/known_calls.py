@@ -48,6 +48,7 @@ from .values import (
     function_choice,
     holder,
     is_builtin,
+    is_one_of,
     least_upper_bound,
     library,
     python_function,
@@ -73,12 +74,17 @@ MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, f
 TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
 
 
+def takes_alone(thing: object) -> bool:
+    """Whether a function calls nothing, and puts nothing into what it is given."""
+    return is_one_of(thing, TAKING)
+
+
 def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
         return walk.first_call(wrapped, given)
-    if thing in (np.errstate, warnings.catch_warnings) or (
+    if is_one_of(thing, (np.errstate, warnings.catch_warnings)) or (
         isinstance(thing, type) and issubclass(thing, BaseException)
     ):
         return FRESH

@@ -35,6 +35,7 @@ from .values import (
     element,
     forgotten,
     holder,
+    is_one_of,
     least_upper_bound,
     library,
     was_there,
@@ -290,7 +291,7 @@ class CallWalker(Expressions):
         for item in node.items:
             call = item.context_expr
             entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
-            plain = entered in (np.errstate, contextlib.suppress, warnings.catch_warnings)
+            plain = is_one_of(entered, (np.errstate, contextlib.suppress, warnings.catch_warnings))
             if not plain or item.optional_vars is not None:
                 left.append(self.entered(item))
             ends_early |= entered is contextlib.suppress
@@ -322,7 +323,8 @@ class CallWalker(Expressions):
         call = node.value if isinstance(node, ast.Expr) else None
         if not isinstance(call, ast.Call):
             return False
-        return self.visit(call.func).known in (warnings.simplefilter, warnings.filterwarnings)
+        called = self.visit(call.func).known
+        return is_one_of(called, (warnings.simplefilter, warnings.filterwarnings))
 
     def visit_Import(self, node: ast.Import) -> None:
         for alias in node.names:

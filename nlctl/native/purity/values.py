@@ -377,6 +377,11 @@ def was_there(thing: object) -> bool:
     return is_somebodys(thing) and not isinstance(thing, kinds)
 
 
+def is_one_of(thing: object, several: Iterable[object]) -> bool:
+    """Whether a thing is one of several, without asking its class what is equal to it."""
+    return any(thing is one for one in several)
+
+
 def has_no_truth(thing: object) -> bool:
     """Whether a thing is true or false without code of somebody: None, a list, a plain object."""
     cls = thing.cls if isinstance(thing, Instance) else type(thing)

@@ -166,6 +166,19 @@ def array_of_the_state(t, x, u, p):
     return -x
 
 
+class Agreeing:
+    """An object that is equal to anything, and another after each call."""
+
+    __hash__ = None
+
+    def __eq__(self, other):
+        return True
+
+    def __call__(self, v):
+        LOG[0] += 1.0
+        return v * LOG[0]
+
+
 class Logging(Counted):
     """An iterator that counts how often all of its kind are asked."""
 
@@ -195,7 +208,7 @@ def first_of(values):
     return first + 0.1 * len(others)
 
 
-LOG, UNITS = [0.0], Vector(1.0, 0.5)
+LOG, UNITS, AGREEING = [0.0], Vector(1.0, 0.5), Agreeing()
 JOBS = [Job(1.0, 2.0), Job(3.0, 0.5)]
 ROW, VALUES, RESTLESS = Row([1.0, 2.0, 0.5]), Values({"k": 2.0, "c": 0.3}), Restless()
 LEGAL = {
@@ -244,6 +257,7 @@ REFUSED = {
     "attribute": lambda t, x, u, p: [-x[0] * RESTLESS.gain],
     "start of a sum": lambda t, x, u, p: [-x[0] * sum([1.0], start=RESTLESS)],
     "array": array_of_the_state,
+    "call of what equals all": lambda t, x, u, p: [-AGREEING(1.0) * x[0]],
     "sum of nothing": lambda t, x, u, p: -doubled(sum([], x)),
     "rows": lambda t, x, u, p: -doubled(list(Rows(x))[1]),
     "loop": lambda t, x, u, p: [-x[0] * sum(k for k in Logging())],
