@@ -437,9 +437,7 @@ class Expressions(ast.NodeVisitor):
         reaches = any(v.holds for v in given.every) or not all(plain)
         if self.walk.keeps > before and reaches:
             self.lists_may_hold_others()
-        takes = [
-            isinstance(f.known, Local) or is_one_of(f.known, known_calls.TAKING) for f in called
-        ]
+        takes = [isinstance(f.known, Local) or known_calls.takes_alone(f.known) for f in called]
         if not all(p or t for p, t in zip(plain, takes, strict=True)):
             for value in given.every:  # a list may have been given something else to keep
                 self.kept(value, [v for v in given.every if v is not value])
