@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .graph import Expr, Graph, Untraceable, catchable
+from .protocols import parts_of_object
 
 _MOST = 2048  # elements of an array that are kept individually
 _TABLED = 256  # elements of a constant matrix beyond which each row is a table
@@ -382,10 +383,8 @@ def full_index(key: Any, ndim: int) -> list[Any]:
         raise Untraceable("indexing by arrays")
     keys = [k if k is None or k is ... or isinstance(k, slice) else operator.index(k) for k in keys]
     missing = [slice(None)] * (ndim - sum(k is not None and k is not ... for k in keys))
-    if ... in keys:
-        at = keys.index(...)
-        return [*keys[:at], *missing, *keys[at + 1 :]]
-    return [*keys, *missing]
+    at = keys.index(...) if ... in keys else len(keys)
+    return [*keys[:at], *missing, *keys[at + 1 :]]
 
 
 def scalar(graph: Graph, expr: Expr) -> Tracer:
@@ -420,7 +419,7 @@ def traced(graph: Graph, value: object) -> Tracer:
             return concatenated(graph, [p.reshape(1) for p in parts])
         return Tracer(graph, _stacked([p.cells for p in parts], 0, ()))
     if not (type(value) is np.ndarray or isinstance(value, bool | int | float | np.generic)):
-        raise Untraceable(f"values of type {type(value).__name__}")
+        return traced(graph, parts_of_object(value))
     array = np.asarray(value)
     if array.dtype == object and array.shape and all(_is_number(v) for v in array.flat):
         return traced(graph, array.tolist())  # what NumPy has made of tracers, one by one

@@ -6,11 +6,11 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from .graph import LINEAR, OF_FACTORS, Expr, needed
+from .graph import ADDITIVE, OF_FACTORS, Expr, needed
 
 # each element of the result depends on all that goes in
-_WHOLE = ("sum", "call", "solve", *LINEAR, *OF_FACTORS)
-LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")  # in what they are made of
+_WHOLE = ("sum", "call", "solve", *ADDITIVE, *OF_FACTORS)
+ADDITIVE = ("add", "sub", "neg", "sum", "item", "slice", "concat")  # in what they are made of
 
 
 def rows_read(leaf: Expr) -> list[int]:
@@ -60,7 +60,7 @@ def affine(expr: Expr, leaf: Expr) -> bool:
     """Whether an expression is a + b v for all values, as it is written."""
     for node, by in dependent_nodes(expr, leaf):
         linear = (
-            node.op in LINEAR
+            node.op in ADDITIVE
             or (node.op == "mul" and sum(by) == 1)
             or (node.op == "div" and not by[1])
             or (node.op == "lu_solve" and not by[0])

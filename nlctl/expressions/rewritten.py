@@ -36,6 +36,7 @@ from .texts import filled_in, formatted, text_of
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
+_UNPACKING = ("UNPACK_SEQUENCE", "UNPACK_EX")  # where there are too few values or too many
 _METHODS = ("index", "sort", "format")  # of lists and texts, of which others are called
 _KEYS, _ASKED_OF = (int, float, bool), {"values": "values", "__class__": "type"}
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
@@ -376,7 +377,7 @@ def is_raised(error: BaseException) -> bool:
     code = place.tb_frame.f_code
     is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
     is_staged |= code in (item_at.__code__, NumberKeys.__getitem__.__code__)
-    raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+    raises = dis.opname[code.co_code[place.tb_lasti]] in ("RAISE_VARARGS", *_UNPACKING)
     return is_staged and (raises or isinstance(error, _PYTHONS) or "NoneType" in str(error))
 
 

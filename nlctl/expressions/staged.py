@@ -143,6 +143,9 @@ class StagedType:
         return functools.partial(written, stage.graph)
 
 
+_ABSENT = object()
+
+
 class StagedObject:
     """An object of somebody's class: what its methods read is replaced as well."""
 
@@ -182,6 +185,10 @@ class StagedObject:
             return functools.partial(written, stage.graph)
         if is_of_a_library(real) and callable(getattr(real, name)):
             return stage.for_numbers(getattr(real, name))
+        finder = inspect.getattr_static(type(real), "__getattr__", None)
+        is_missing = inspect.getattr_static(real, name, _ABSENT) is _ABSENT
+        if is_missing and isinstance(finder, FunctionType) and not is_of_a_library(real):
+            return stage.copied(finder)(self, name)
         return stage.instead(getattr(real, name))
 
     def __setattr__(self, name: str, value: object) -> None:

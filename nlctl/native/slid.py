@@ -348,14 +348,14 @@ def _further(
     try:
         diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
         whole = _parameters(diagram, p, [far for _, far in slides], float(np.ptp(times)))
-        check_sides(compiled, diagram, p, whole, last.reached.statistics.jump)
+        compare_sides(compiled, diagram, p, whole, last.reached.statistics.jump)
         reached = run(diagram, with_modes(x0, len(slides), times), whole)
     except (CompileError, ParameterError):
         return None
     return SlidRun(compiled=diagram, p=whole, reached=reached, slides=slides)
 
 
-def check_sides(
+def compare_sides(
     compiled: Compiled, slid: Compiled, p: np.ndarray, whole: np.ndarray, jump: Jump | None
 ) -> None:
     """Refuse a diagram whose rates and outputs are others with each relay on its side, anywhere."""

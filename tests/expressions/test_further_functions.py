@@ -76,6 +76,12 @@ FUNCTIONS = {
     "items as attributes": lambda x: BUNCH.gain * x[0] + BUNCH.inner.offsets[1] + BUNCH["gain"],
     "bits of Python's integers": lambda x: (int(10 * x[0]) & 12) + (int(x[1]) | 5) ^ 6,
     "bits below zero": lambda x: (int(10 * x[0]) & -4) + (~int(x[1])),
+    "bits of two integers": lambda x: (
+        (int(x[0] > 0) << 2 | int(x[1] > 0) << 1 | int(x[0] > x[1])) ^ (int(10 * abs(x[0])) & 7)
+    ),
+    "Gray code": lambda x: (n := int(10 * abs(x[0])) & 31) ^ (n >> 1),
+    "bits of one below zero": lambda x: (int(10 * x[0]) & 13) & int(10 * x[1]),
+    "bits of sums": lambda x: (int(x[0] > 0) + 2 * (int(3 * x[1]) % 5)) | (int(7 * x[0]) & 9),
     "shifts": lambda x: (int(10 * x[0]) >> 2) + (int(x[1]) << 3) + (1 << int(x[0] > 0)),
     "quotients": lambda x: int(10 * x[0]) // 3 + int(10 * x[1]) // -4,
     "bits of NumPy's": lambda x: np.bitwise_xor((10 * x).astype(int), 5).sum(),

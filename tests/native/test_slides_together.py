@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nlctl
-from nlctl.native.slid import check_sides, slides_at, with_modes, with_relays
+from nlctl.native.slid import compare_sides, slides_at, with_modes, with_relays
 
 WIDTH = 1e-5
 methods = pytest.mark.parametrize("method", [None, "tsit5", "rodas5p", "taylor"])
@@ -133,10 +133,10 @@ def test_sides_are_compared_with_the_equations():
         slid = with_relays(compiled, (replace(slide, sides=(sides,)),), p)
         whole = np.append(p, np.ones(8))[: slid.parameter_vector(None).size]
         if fits:
-            check_sides(compiled, slid, p, whole, jump)
+            compare_sides(compiled, slid, p, whole, jump)
         else:
             with pytest.raises(nlctl.errors.CompileError, match="do not stand for"):
-                check_sides(compiled, slid, p, whole, jump)
+                compare_sides(compiled, slid, p, whole, jump)
 
 
 def test_relays_slide_at_first_and_no_side_has_led_away():

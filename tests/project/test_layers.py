@@ -86,7 +86,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["limits", "signs"],
         ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
-        ["integers", "gains", "passes"],
+        ["integers", "gains", "passes", "protocols"],
         ["arrays", "promoted", "operators", "masked", "many_pieces", "edges"],
         ["sharp", "without_poles", "decimals"],
         ["levels"],

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Tracer, full, mapped, traced
 from ..graph import Expr, Graph, Untraceable
 from ..operators import NO_INTEGER, elementwise
+from ..protocols import is_asked_for_copies, parts_of_object, without_objects
 from .complex_numbers import ComplexPair, holds_complex, paired
 from .python_objects import PythonNumbers
 from .shapes import by_moving
@@ -79,6 +80,11 @@ def array(
     order: str = "K",
 ) -> Any:  # fmt: skip
     """Return numbers, lists and arrays as an array of its own, in whatever order of memory."""
+    if is_asked_for_copies(values):
+        if not copy or ndmin:
+            raise Untraceable("an array of an object in another way")
+        return asarray(graph, parts_of_object(values, copy=True), dtype)
+    values = without_objects(values)
     if isinstance(values, PythonNumbers):
         return values.astype(dtype)
     if not copy and isinstance(values, Tracer) and not ndmin:
@@ -127,6 +133,7 @@ def ascontiguousarray(graph: Graph, values: object, dtype: object = None) -> Any
 @of(np.asarray, np.asanyarray, np.asarray_chkfinite, makes=True)
 def asarray(graph: Graph, values: object, dtype: object = None) -> Any:
     """Return an array as it is, anything else as an array."""
+    values = without_objects(values)
     if isinstance(values, ComplexPair):
         return values
     if not isinstance(values, Tracer):

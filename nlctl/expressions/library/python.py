@@ -69,6 +69,19 @@ _OVERFLOWING = ("exp", "expm1", "exp2", "sinh", "cosh")
 _UNSETTLED = ("power", "hypot")
 
 
+def _number_of(value: Any, name: str, kind: str) -> Any:
+    """Return the number that an object's class makes of it, where that depends on the state."""
+    method = getattr(type(value), name, None)
+    if isinstance(value, Tracer) or not isinstance(method, FunctionType):
+        return value
+    number = method(value)
+    if not isinstance(number, Tracer):
+        return value
+    if number.shape or number.only.kind != kind:
+        raise Untraceable(f"'{name}' of an object returns something else")
+    return number
+
+
 def guard_whole(graph: Graph, value: Tracer) -> None:
     """Note that Python makes no integer of NaN or infinity."""
     op = functools.partial(elementwise, graph)
@@ -113,6 +126,7 @@ class Builtins:
         return text_of(lambda: of_numbers(*given), *((v, "") for v in given))
 
     def _float(self, value: Any = 0.0) -> Any:
+        value = _number_of(value, "__float__", "f")
         if not isinstance(value, Tracer):
             return float(value)
         only = _single(value)
@@ -124,6 +138,7 @@ class Builtins:
         return WRITTEN[complex](self.graph, *parts)
 
     def _int(self, value: Any = 0, *rest: Any) -> Any:
+        value = _number_of(value, "__int__", "i")
         if not isinstance(value, Tracer):
             return int(value, *rest)
         only = _single(value)
@@ -248,6 +263,8 @@ class Builtins:
         key = options.pop("key", None)
         if values:
             options.pop("default", None)
+        elif "default" not in options:
+            raise catchable(ValueError)
         keys = [v if key is None else key(v) for v in values]
         if not any(map(_holds_traced, (*values, *keys))):
             return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)
@@ -283,6 +300,10 @@ def copied(graph: Graph, value: Any, memo: object = None) -> Any:
         return type(value)(copied(graph, v) for v in value)
     if type(value) is dict:
         return {k: copied(graph, v) for k, v in value.items()}
+    if isinstance(value, float | int | str | bytes | NoneType | np.generic):
+        return value
+    if type(value) is np.ndarray and value.dtype == float:
+        return traced(graph, value).copy()
     raise Untraceable(f"a copy of {type(value).__name__}")
 
 

@@ -108,7 +108,11 @@ def interp(
         around = [order[-1], *order, order[0]]
         values = [values[k] for k in around] if is_open else np.asarray(values)[around]
         places = places[around] + np.array([-turn, *np.zeros(order.size), turn])
-    if places.size != len(values) or np.any(np.diff(places) <= 0):
+    if (
+        places.size != len(values)
+        or np.any(np.diff(places) < 0)
+        or (places.size > 1 and places[0] == places[-1])
+    ):
         raise Untraceable("a table whose places do not increase")
     ends = [_number(graph, v) if e is None else traced(graph, e).only for e, v in
             ((left, values[0]), (right, values[-1]))]  # fmt: skip
@@ -124,12 +128,17 @@ def _linear(
     """Return NumPy's formula of an interval: slope (x - x_j) + f_j, and f_j at the last place."""
     op, const = graph.op, graph.const
     x, last = graph.number(x), _number(graph, values[-1])
-    slopes = np.diff(values) / np.diff(places) if isinstance(values, np.ndarray) else [
+    widths = np.diff(places)
+    wide = widths > 0  # where a place comes twice it jumps, to the last value there
+    is_known = isinstance(values, np.ndarray)
+    slopes = np.asarray(np.diff(values))[wide] / widths[wide] if is_known else [
         op("div", op("sub", b, a), const(float(width)))
-        for (a, b), width in zip(pairwise(values), np.diff(places), strict=True)
+        for (a, b), width in zip(pairwise(values), widths, strict=True) if width > 0
     ]  # fmt: skip
-    pieces = zip(slopes, values, strict=False)
-    value = interval_polynomial(graph, x, places, pieces) if places.size > 1 else last
+    begins = [value for value, is_wide in zip(values, wide, strict=False) if is_wide]
+    pieces = zip(slopes, begins, strict=True)
+    breaks = np.append(places[:-1][wide], places[-1])
+    value = interval_polynomial(graph, x, breaks, pieces) if places.size > 1 else last
     value = op("select", op("eq", x, const(float(places[-1]))), last, value)
     return beyond_ends(graph, x, (places[0], places[-1]), value, left, right)
 

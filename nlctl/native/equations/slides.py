@@ -19,7 +19,7 @@ import numpy as np
 from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array
 from ...expressions.conditions import of_zigzag, switching_functions, zigzag
-from ...expressions.dependence import LINEAR
+from ...expressions.dependence import ADDITIVE
 from ...expressions.functions import COUNTING
 from ...expressions.graph import COMPARISONS, LOGIC, ORDERS, Expr, Graph, deduce, needed
 from ...wording import counted
@@ -172,7 +172,7 @@ def _by_terms(
         by = [depends[arg] for arg in node.args]
         apart = (node.op == "mul" and by[0].isdisjoint(by[1])) or (node.op == "div" and not by[1])
         apart |= node.op == "select" and not by[0]  # as math.sin has one: it is NaN of infinity
-        return node.args if len(depends[node]) > 1 and (node.op in LINEAR or apart) else ()
+        return node.args if len(depends[node]) > 1 and (node.op in ADDITIVE or apart) else ()
 
     def changed(node: Expr) -> Expr:
         if terms(node):

@@ -108,7 +108,8 @@ class FunctionWalk(Walk):
         if isinstance(thing, Unknown):
             raise Impure("calls what is only known when it runs", "call a function by its name")
         if isinstance(thing, OneOf):
-            return least_upper_bound([self.call(choice, given) for choice in thing.choices])
+            choices = [choice for choice in thing.choices if choice.known is not None]
+            return least_upper_bound([self.call(choice, given) for choice in choices])
         if isinstance(thing, ListOf):
             raise Impure("calls a list", "call what is in it")
         if isinstance(thing, Pure):

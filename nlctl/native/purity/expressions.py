@@ -6,17 +6,16 @@ import ast
 import enum
 import functools
 import inspect
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
-import numpy as np
-
 from ...expressions.source import cells_of, source_file
-from . import handed_on, known_calls, made
+from . import handed_on, known_calls, made, operators, texts
 from .captured import GONE, Captured
-from .known_calls import MEMORY
+from .checked import MEMORY, check_object
 from .parts import is_plain_attribute, names_read, part_at, part_of_one, part_of_row
 from .values import (
     FRESH,
@@ -39,7 +38,6 @@ from .values import (
     Unknown,
     captured,
     element,
-    forgotten,
     holder,
     is_itself_alone,
     least_upper_bound,
@@ -48,16 +46,10 @@ from .values import (
     one_among,
     row,
 )
+from .views import attribute_of_array, indexed, is_array
 from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
-OPERATORS = {
-    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv",
-    ast.Mod: "mod", ast.Pow: "pow", ast.MatMult: "matmul", ast.BitAnd: "and", ast.BitOr: "or",
-    ast.BitXor: "xor", ast.LShift: "lshift", ast.RShift: "rshift", ast.Lt: "lt", ast.LtE: "le",
-    ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne",
-}  # fmt: skip
-_TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
 _SAME = (ast.Eq, ast.NotEq, ast.Is, ast.IsNot)
 _SIGNS = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__", ast.Not: "__bool__"}
 
@@ -154,7 +146,8 @@ class Expressions(ast.NodeVisitor):
         base, key = self.visit(target.value), FRESH
         if isinstance(target, ast.Subscript):
             key = self.visit(target.slice)
-        objects = base.known.choices if isinstance(base.known, OneOf) else (base,)
+        several = base.known.choices if isinstance(base.known, OneOf) else (base,)
+        objects = [thing for thing in several if thing.known is not None]
         if all(isinstance(thing.known, Instance) for thing in objects):
             for thing in objects:
                 self.write_object(target, thing, value)
@@ -220,38 +213,18 @@ class Expressions(ast.NodeVisitor):
         return value
 
     def visit_BinOp(self, node: ast.BinOp) -> KnownValue:
-        return self.operated(type(node.op), self.visit(node.left), self.visit(node.right))
+        values = [self.visit(part) for part in (node.left, node.right)]
+        return operators.operated(self.walk, type(node.op), *values)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
-        value = self.visit(node.operand)
-        operator = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
-        if operator is not None:
-            return self.walk.function(operator, Given((value,)))
-        self.operands([value])
-        return FRESH
-
-    def operated(self, kind: type, left: KnownValue, right: KnownValue) -> KnownValue:
-        """Return what is known of the result of an operator, which an object's class may have."""
-        name, results, plain = OPERATORS.get(kind, ""), [], []
-        mirrored = _TURNED.get(name, f"r{name}")
-        for one, other, special in ((left, right, name), (right, left, mirrored)):
-            operator = made.operator_of(self.walk, one, f"__{special}__") if name else None
-            if operator is None:
-                plain.append(one)
-            else:
-                results.append(self.walk.function(operator, Given((one, other))))
-        if results:
-            return least_upper_bound(results)
-        self.operands(plain)
-        return handed_on.operated(kind, plain)
-
-    def operands(self, values: Sequence[KnownValue]) -> None:
-        """Check that operators are those of numbers, arrays and containers."""
-        for value in values:
-            known_calls.check_object(value, "computes with")
+        value, name = self.visit(node.operand), _SIGNS.get(type(node.op), "")
+        if isinstance(node.op, ast.Not):
+            operators.tested(self.walk, value)
+            return FRESH
+        return operators.signed(self.walk, name, value)
 
     def condition(self, node: ast.expr) -> None:
-        self.operands([self.visit(node)])
+        operators.tested(self.walk, self.visit(node))
 
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
         values = [self.visit(part) for part in (node.left, *node.comparators)]
@@ -259,10 +232,14 @@ class Expressions(ast.NodeVisitor):
             if isinstance(test, _SAME) and all(map(is_itself_alone, (left, right))):
                 self.walk.numba_differs += ["identity"]
                 return FRESH
-            self.operated(type(test), left, right)
+            if isinstance(test, ast.In | ast.NotIn):
+                operators.contains(self.walk, right, left)
+            elif not isinstance(test, ast.Is | ast.IsNot):
+                operators.operated(self.walk, type(test), left, right)
         for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_constant = isinstance(part, ast.Constant) and part.value in (None, True, False)
             is_one = is_constant or isinstance(value.known, enum.Enum | type)
+            is_one |= value.known is NotImplemented
             if is_one and isinstance(part, ast.Constant) and part.value is not None:
                 self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
             if isinstance(test, ast.Is | ast.IsNot) and not is_one:
@@ -271,7 +248,8 @@ class Expressions(ast.NodeVisitor):
 
     def visit_BoolOp(self, node: ast.BoolOp) -> KnownValue:
         values = [self.visit(part) for part in node.values]
-        self.operands(values)
+        for value in values:
+            operators.tested(self.walk, value)
         return least_upper_bound(values)
 
     def decided(self, test: ast.expr) -> bool | None:
@@ -319,10 +297,13 @@ class Expressions(ast.NodeVisitor):
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
         self.walk.numba_differs += ["text"]  # numba writes numbers in other digits than Python
-        for part in ast.walk(node):
-            if isinstance(part, ast.FormattedValue):
-                self.visit(part.value)
-        return FRESH
+        return texts.joined([self.visit(part) for part in node.values])
+
+    def visit_FormattedValue(self, node: ast.FormattedValue) -> KnownValue:
+        value = self.visit(node.value)
+        if node.format_spec is not None:
+            self.visit(node.format_spec)
+        return value if node.format_spec is None and node.conversion == -1 else FRESH
 
     def visit_Subscript(self, node: ast.Subscript) -> KnownValue:
         base = self.visit(node.value)
@@ -353,14 +334,8 @@ class Expressions(ast.NodeVisitor):
                 return captured(base.known[key])
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
-        self.operands([base])
-        if not base.holds and any(isinstance(index, ast.List) for index in indices):
-            return replace(forgotten(base), own=True)  # a copy of these elements
-        is_view = any(isinstance(key, slice | type(None)) for key in keys)
-        if is_view or any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
-            return forgotten(base)  # or may be one
-        whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
-        return FRESH if whole else element(base)
+        operators.operands([base])
+        return indexed(base, indices, values)
 
     def visit_Attribute(self, node: ast.Attribute) -> KnownValue:
         return self.attribute(self.visit(node.value), node.attr)
@@ -368,6 +343,8 @@ class Expressions(ast.NodeVisitor):
     def attribute(self, base: KnownValue, name: str) -> KnownValue:
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
+        if is_array(base):
+            return attribute_of_array(base, name)
         if isinstance(thing, Unknown | Pure):
             is_new = base.own and (base.inside or not base.holds)
             return replace(base, own=base.inside if isinstance(thing, Pure) else is_new)
@@ -378,18 +355,11 @@ class Expressions(ast.NodeVisitor):
         if isinstance(thing, Parent):
             return made.of_parent(self.walk, thing, name)
         if isinstance(thing, OneOf):
-            return least_upper_bound([self.attribute(choice, name) for choice in thing.choices])
-        if isinstance(thing, np.ndarray):
-            return forgotten(base)
+            choices = [choice for choice in thing.choices if choice.known is not None]
+            return least_upper_bound([self.attribute(choice, name) for choice in choices])
         entry = inspect.getattr_static(type(thing), name, None)
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
-            self.walk.captured(type(thing), name, entry)
-            getter = entry.fget if isinstance(entry, property) else entry.func
-            if isinstance(entry, functools.cached_property):
-                self.walk.captured(vars(thing), name, getattr(thing, name, None))
-                return self.walk.first_call(captured(getter), Given((base,)))
-            result = self.walk.call(captured(getter), Given((base,)))
-            return result if not result.own else FRESH
+            return self.computed(base, name, entry)
         if isinstance(entry, functools._lru_cache_wrapper):
             self.walk.captured(type(thing), name, entry)
             return made.of_class(self.walk, base, entry)
@@ -406,7 +376,30 @@ class Expressions(ast.NodeVisitor):
             if (library(type(thing)) or "").startswith(("pandas", "scipy.sparse")):
                 return captured(value)  # a part of a table that is noted
             return self.walk.captured(thing, name, value)
-        raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
+        return self.searched_for(base, name)
+
+    def searched_for(self, base: KnownValue, name: str) -> KnownValue:
+        """Return what is known of an attribute that an object's ``__getattr__`` finds."""
+        cls = type(base.known)
+        finder = inspect.getattr_static(cls, "__getattr__", None)
+        is_missing = inspect.getattr_static(base.known, name, GONE) is GONE
+        if not isinstance(finder, FunctionType) or not is_missing or library(cls) is not None:
+            raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
+        holders = [cls, *([vars(base.known)] if hasattr(base.known, "__dict__") else [])]
+        self.walk.note([Captured(holder, name, GONE) for holder in holders])
+        self.walk.captured(cls, "__getattr__", finder)
+        return self.walk.function(finder, Given((base, captured(name))))
+
+    def computed(
+        self, base: KnownValue, name: str, entry: property | functools.cached_property[Any]
+    ) -> KnownValue:
+        """Return what is known of what a property of an object that was there before returns."""
+        self.walk.captured(type(base.known), name, entry)
+        if isinstance(entry, functools.cached_property):
+            self.walk.captured(vars(base.known), name, getattr(base.known, name, None))
+            return self.walk.first_call(captured(entry.func), Given((base,)))
+        result = self.walk.call(captured(entry.fget), Given((base,)))
+        return result if not result.own else FRESH
 
     def visit_Call(self, node: ast.Call) -> KnownValue:
         places = tuple(self.visit(part) for part in node.args)
@@ -426,13 +419,15 @@ class Expressions(ast.NodeVisitor):
         given = made.with_field_names(node, function.known, given)
         if function.known is super and not places:
             return self.parent_class()
+        if function.known is operator.attrgetter:
+            return self.reader_of(places)
         if function.known is getattr or made.asks_what_is_there(function.known, places):
             names, others = names_read(*places)
             read = least_upper_bound([*(self.attribute(places[0], n) for n in names), *others])
             return read if function.known is getattr else FRESH
         before = self.walk.keeps
         try:
-            result = self.made_once(node, self.walk.call(function, given))
+            result = self.walk.made_once((node, self.frame), self.walk.call(function, given))
         except Message as message:
             message.place = f"{source_file(self.frame.function)}, line {node.lineno}"
             self.walk.messages.append(message)
@@ -442,22 +437,20 @@ class Expressions(ast.NodeVisitor):
         reaches = any(v.holds for v in given.every) or not all(plain)
         if self.walk.keeps > before and reaches:
             self.lists_may_hold_others()
-        takes = [isinstance(f.known, Local) or f.known in known_calls.TAKING for f in called]
+        takes = [isinstance(f.known, Local) or known_calls.takes_alone(f.known) for f in called]
         if not all(p or t for p, t in zip(plain, takes, strict=True)):
             for value in given.every:  # a list may have been given something else to keep
                 self.kept(value, [v for v in given.every if v is not value])
         return result
 
-    def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
-        """Return one object for all that a call makes in a loop, which is walked again."""
-        if not isinstance(result.known, Instance):
-            return result
-        before = self.walk.made.get((node, self.frame))
-        if before is not None and before.known.cls is result.known.cls:
-            before.known.absorb(result.known)
-            result = replace(result, known=before.known)
-        self.walk.made[node, self.frame] = result
-        return result
+    def reader_of(self, names: Sequence[KnownValue]) -> KnownValue:
+        """Return the function that `operator.attrgetter` makes: it reads attributes by names."""
+        if not all(isinstance(name.known, str) for name in names):
+            raise Impure("calls attrgetter() by a name that is only known when it runs", "write it")
+        read = [f"one.{name.known}" for name in names]
+        text = f"lambda one: ({', '.join(read)})" if len(read) > 1 else f"lambda one: {read[0]}"
+        tree = ast.parse(text, mode="eval").body
+        return self.visit(ast.increment_lineno(tree, self.line - 1))
 
     def parent_class(self) -> KnownValue:
         """Return what ``super()`` stands for."""
@@ -496,5 +489,5 @@ class Expressions(ast.NodeVisitor):
 
     def iterated(self, value: KnownValue) -> None:
         # whatever is in a list is only handed on
-        if not isinstance(value.known, ListOf) and not known_calls.iterates(self.walk, value):
-            known_calls.check_object(value, "goes through")
+        if not isinstance(value.known, ListOf) and not made.iterates(self.walk, value):
+            check_object(value, "goes through")

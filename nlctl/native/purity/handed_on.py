@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
+from .texts import is_text, joined
 from .values import (
     FRESH,
     OUTSIDE,
     UNKNOWN_VALUE,
-    VECTOR,
+    ArraysOf,
     Bound,
     Cached,
     Given,
@@ -23,6 +27,7 @@ from .values import (
     OneOf,
     Pure,
     RowOf,
+    Unknown,
     element,
     forgotten,
     function_choice,
@@ -35,6 +40,7 @@ from .walk import Walk
 _OF_ROWS = ("product", "permutations", "combinations", "combinations_with_replacement",
             "zip_longest", "pairwise", "batched", "tee", "groupby")  # fmt: skip
 _ZIPPED = ("product", "zip_longest")
+_OF_ONE = (list, tuple, set, frozenset, iter, reversed, sorted)
 
 
 def _functions_in(given: Sequence[KnownValue]) -> Any:
@@ -52,7 +58,12 @@ def _functions_in(given: Sequence[KnownValue]) -> Any:
 def rows_of_functions(thing: object, given: Sequence[KnownValue]) -> Any:
     """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
     kept = _functions_in(given)
-    is_mixed = not all(v.inside for v in given) and any(v.own and v.inside for v in given)
+    is_followed = any((v.own and v.inside) or v.rank is not None for v in given)
+    is_mixed = is_followed and not all(v.inside for v in given)
+    if thing in _OF_ONE and kept is UNKNOWN_VALUE and len(given) == 1:
+        part = element(given[0])
+        is_array = isinstance(part.known, Unknown | np.ndarray) and not part.holds
+        return ArraysOf(forgotten(part)) if is_array else kept
     if not (isinstance(kept, ListOf) or is_mixed) or thing not in (zip, enumerate):
         return kept
     parts = tuple(map(element, given))
@@ -64,7 +75,7 @@ def rows_of_functions(thing: object, given: Sequence[KnownValue]) -> Any:
 def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValue | None:
     """Return what is known of what Python's functions hand on of what they are given."""
     if (module, name) == ("copy", "copy") and places:
-        return KnownValue(True, places[0].inside, places[0].holds)
+        return KnownValue(True, places[0].inside or not places[0].holds, places[0].holds)
     if (module, name) == ("builtins", "fromkeys"):
         return holder(places[1:])
     if (module, name) == ("builtins", "mappingproxy") and places:
@@ -82,13 +93,16 @@ def handed_on(module: str, name: str, places: Sequence[KnownValue]) -> KnownValu
     return replace(held, known=rows_of_functions(zip, places)) if name in _ZIPPED else held
 
 
-def views_of(values: Sequence[KnownValue]) -> KnownValue:
-    """Return what is known of a list of views of arrays, each of which is whose the array is."""
-    if all(v.own for v in values):
-        return KnownValue(True, all(v.inside for v in values), True)
-    if all(v.inside for v in values):
-        return KnownValue(True, False, True, known=ListOf((VECTOR,)))
-    return KnownValue(True, False, True)
+def written_places(thing: object, name: str, given: Given) -> list[tuple[KnownValue, str]]:
+    """Return the arguments that a function may write into, and by which of its own it does."""
+    ways = [
+        k for k, v in given.names.items() if k.startswith("overwrite_") and v.known is not False
+    ]
+    if ways:  # of SciPy: it takes their memory for its result
+        return [(value, f"{ways[0]}=True") for value in given.places]
+    begin = {"clip": 3, "dot": 2}.get(name, sys.maxsize)
+    begin = thing.nin if isinstance(thing, np.ufunc) else begin
+    return [(value, "out") for value in given.places[begin:]]
 
 
 def holds_others(value: KnownValue) -> bool:
@@ -97,10 +111,12 @@ def holds_others(value: KnownValue) -> bool:
     return is_container and not value.inside
 
 
-def operated(kind: type, values: Sequence[KnownValue]) -> KnownValue:
+def result_of_plain(kind: type, values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of the result of an operator of numbers, arrays and containers."""
     if kind in (ast.Add, ast.Mult, ast.BitOr) and any(map(holds_others, values)):
         return KnownValue(True, False, True)  # a list or dict of what is in both
+    if kind is ast.Add and values and all(map(is_text, values)):
+        return joined(values)
     of_library = any(isinstance(v.known, Pure) for v in values)
     return KnownValue(True, True, known=Pure()) if of_library else FRESH
 

@@ -8,21 +8,21 @@ import functools
 import inspect
 import logging
 import re
-import sys
 import warnings
-from collections import ChainMap, Counter, OrderedDict, defaultdict, deque, namedtuple
+from collections import ChainMap, defaultdict, namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
-from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
+from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...expressions.gains import computes_gains
 from ...expressions.source import cells_of, is_dispatcher
-from . import made
+from . import made, operators
 from . import method_names as named
-from .handed_on import handed_on, result_of_reduce, rows_of_functions, views_of
+from .checked import HOLDERS, MEMORY, check_object
+from .handed_on import handed_on, result_of_reduce, rows_of_functions, written_places
 from .values import (
     FRESH,
     OUTSIDE,
@@ -41,7 +41,6 @@ from .values import (
     OneOf,
     Parent,
     Pure,
-    RowOf,
     Unknown,
     captured,
     element,
@@ -49,14 +48,15 @@ from .values import (
     function_choice,
     holder,
     is_builtin,
+    is_one_of,
     least_upper_bound,
     library,
     python_function,
     row,
 )
+from .views import LISTS_OF_VIEWS, VIEWS, viewed, viewed_by_function, views_of, with_objects
 from .walk import Walk
 
-MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
 _RECORD = "make what it records an output of the block, what it reads again a state"
 DRAW = "draw the values before the run and give them as an input"
@@ -69,10 +69,14 @@ _SEEDED = ("default_rng", "RandomState")
 CONTAINERS = (np.ndarray | np.generic | np.ufunc | dict | list | tuple | set | frozenset | str
               | bytes | bool | int | float | complex | range)  # fmt: skip
 WITH_METHODS = CONTAINERS | re.Pattern | re.Match  # whose methods are new each time they are read
-HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict, ChainMap)
 _OF_TUPLES = [getattr(namedtuple("_", ""), n).__code__ for n in ("_replace", "_asdict")]
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 TAKING = (*MAKING[:8], *HOLDERS)  # which call nothing, and put nothing into what they are given
+
+
+def takes_alone(thing: object) -> bool:
+    """Whether a function calls nothing, and puts nothing into what it is given."""
+    return is_one_of(thing, TAKING)
 
 
 def call(walk: Walk, thing: object, given: Given) -> KnownValue:
@@ -80,7 +84,7 @@ def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
         return walk.first_call(wrapped, given)
-    if thing in (np.errstate, warnings.catch_warnings) or (
+    if is_one_of(thing, (np.errstate, warnings.catch_warnings)) or (
         isinstance(thing, type) and issubclass(thing, BaseException)
     ):
         return FRESH
@@ -257,10 +261,10 @@ def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue 
         if given.names.get("inplace", captured(False)).known is not False:
             _written(base, f"{name}(inplace=True)")
         if name == "astype" and given.names.get("copy", captured(True)).known is not True:
-            return forgotten(base)
+            return viewed(name, base)
         return _read(base, name, given.places)
-    if name in named.VIEWS or name in ("T", "flat"):
-        return forgotten(base)
+    if name in VIEWS:
+        return viewed(name, base, given)
     if name in named.CHANGING:
         _written(base, f"{name}()", _RECORD if name in named.RECORDING else MEMORY)
         return least_upper_bound([element(base), *given.places[1:2]]) if base.holds else FRESH
@@ -312,67 +316,26 @@ def _written(base: KnownValue, what: str, advice: str = MEMORY) -> None:
         raise Impure(f"changes with {what} what it did not make", advice)
 
 
-_WITHOUT_CODE = (
-    Unknown
-    | Local
-    | Bound
-    | Cached
-    | Pure
-    | RowOf
-    | enum.Enum
-    | enum.EnumType
-    | BuiltinFunctionType
-)
-
-
-def iterates(walk: Walk, value: KnownValue) -> bool:
-    """Walk the method of somebody's class that goes through an object; return if there is one."""
-    method = made.operator_of(walk, value, "__iter__")
-    if method is not None:
-        walk.function(method, Given((value,)))
-    return method is not None
-
-
-def check_object(value: KnownValue, what: str) -> None:
-    """Check that what a value does by itself is known: no iterator, no class of somebody."""
-    thing = value.known
-    if isinstance(thing, _WITHOUT_CODE) or type(thing) in HOLDERS:
-        return
-    if isinstance(thing, OneOf | ListOf):
-        for choice in thing.choices:
-            check_object(choice, what)
-        return
-    if isinstance(thing, Instance):
-        if issubclass(thing.cls, tuple) and "__iter__" not in vars(thing.cls):
-            return
-        raise Impure(f"{what} an object of type {thing.cls.__name__}", "use arrays")
-    if isinstance(thing, tuple) and hasattr(thing, "_fields"):
-        return
-    if not value.own and hasattr(type(thing), "__next__"):
-        raise Impure(f"uses up {type(thing).__name__}, which it did not make", MEMORY)
-    if library(type(thing)) is None:
-        raise Impure(f"{what} an object of type {type(thing).__name__}", "use arrays")
-
-
 def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     name, places = thing.__name__, given.places
-    operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
-    if operator is not None:
-        return walk.function(operator, Given(places))
+    result = operators.of_builtin(walk, name, places, given.names.get("start", captured(0)))
+    if result is not None:
+        return result
     if (name, len(places)) in made.OF_ATTRIBUTES:
         return made.OF_ATTRIBUTES[name, len(places)](walk, *places)
     by_key = _by_key(walk, name, given)
-    for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
-        if name not in _ITERATING or not iterates(walk, value):
+    is_ordered = not by_key and bool(places) and operators.ordered(walk, name, places)
+    checked = () if is_ordered else places[:1] if name == "next" else places
+    for value in checked if name not in ("isinstance", "issubclass", "callable", "type") else ():
+        if name not in _ITERATING or not made.iterates(walk, value):
             _check_parts(value, name, moves=by_key or name in _MOVING)
     if name == "slice":
         return SLICE
     if name == "type" and len(places) == 1:
         return made.class_of_value(places[0])
     if name in ("min", "max"):
-        return least_upper_bound(
-            [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
-        )
+        parts = [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
+        return least_upper_bound([*parts, *(v for k, v in given.names.items() if k == "default")])
     if thing is map and not isinstance(places[0].known, Unknown):
         return holder([walk.call(places[0], Given(tuple(map(element, places[1:]))))])
     if thing in MAKING:
@@ -382,7 +345,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         return KnownValue(True, inside, True, known=rows_of_functions(thing, places))
     if name == "next":
         _written(places[0], "next()")
-        return element(places[0])
+        return least_upper_bound([element(places[0]), *places[1:]])
     if thing is object:
         return KnownValue(True, True, True, known=Instance(object))
     of_number = name != "hash" or isinstance(places[0].known, (Unknown, *PLAIN))
@@ -394,10 +357,10 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     raise Impure(f"calls {name}()", OUTPUT if name in ("input", "open") else "do without it")
 
 
-_OPERATORS = {"len": "__len__", "abs": "__abs__"}
 _ITERATING = ("list", "tuple", "set", "enumerate", "zip", "map", "filter", "iter", "sum", "sorted",
               "min", "max", "any", "all")  # fmt: skip
-_MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
+_MOVING = ("next", "list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter",
+           "len")  # fmt: skip
 
 
 def _by_key(walk: Walk, name: str, given: Given) -> bool:
@@ -436,6 +399,7 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
         raise Impure(f"calls {name}, which reads or writes files", _FILES)
     if name in _OTHERS and (module, name) != ("json", "loads"):  # which takes a text apart
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
+    asked, given = given, operators.with_arrays(walk, given, module)
     arrays = module.startswith(("numpy", "scipy")) and all(map(_holds_numbers, given.every))
     _call_functions(walk, given.every, VECTOR if arrays else OUTSIDE)
     for value in given.every:
@@ -452,26 +416,19 @@ def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue
     if _makes_objects(thing, module):
         # it may hold what it is given, instead of copies
         return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
-    for value in given.places[_place_of_out(thing, name) :]:
-        _written(value, f"{name}(..., out)")
+    for value, how in written_places(thing, name, given):
+        _written(value, f"{name}(..., {how})")
     may_be_it = given.names.get("copy", captured(True)).known is not True
+    may_be_it |= name == "array" and given.places != asked.places  # which an object may not copy
     if name == "nan_to_num" and may_be_it:
         _written(given.places[0], f"{name}()")
-    if name in named.LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):
-        several = name in ("broadcast_arrays", "meshgrid")
-        return views_of(given.places if several else given.places[:1])
+    if name in LISTS_OF_VIEWS and (name != "meshgrid" or may_be_it):
+        return views_of(name, given.places)
     if name == "einsum" and len(given.places) == 2:
         return forgotten(given.places[1])
-    if name in named.VIEWS or may_be_it or module.startswith("numpy.ma"):
-        return replace(forgotten(given.places[0]), holds=False) if given.places else FRESH
-    return FRESH
-
-
-def _place_of_out(thing: object, name: str) -> int:
-    """Return the place from which arguments are arrays that are written into."""
-    if isinstance(thing, np.ufunc):
-        return thing.nin
-    return {"clip": 3, "dot": 2}.get(name, sys.maxsize)
+    if name in VIEWS or may_be_it or module.startswith("numpy.ma"):
+        return viewed_by_function(name, given)
+    return with_objects(given) or FRESH
 
 
 def _makes_objects(thing: object, module: str) -> bool:
@@ -491,7 +448,7 @@ def _call_functions(walk: Walk, values: Any, part: KnownValue = OUTSIDE) -> None
     """Walk functions that are handed on: they will be called with anything."""
     for value in values:
         thing = value.known
-        if isinstance(thing, Unknown | type | Pure):
+        if isinstance(thing, Unknown | type | Pure) or not made.may_be_called(thing):
             continue
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices, part)

@@ -38,6 +38,7 @@ from .values import (
 from .walk import Walk
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
+_MISSING = "__getattr__"
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)
 # in attributes: what is written under a name that is only known when it runs, and by way of a dict
 _ANY, OF_DICT = "", "__dict__"
@@ -66,6 +67,8 @@ def _check_plain(cls: type) -> None:
     """Refuse a class whose objects are more than their attributes."""
     ruling = [name for name in _RULING if inspect.getattr_static(cls, name, None) is not (
         inspect.getattr_static(object, name, None))]  # fmt: skip
+    if isinstance(inspect.getattr_static(cls, _MISSING, None), FunctionType):
+        ruling.remove(_MISSING)  # which is walked where an attribute may be missing
     if dataclasses.is_dataclass(cls) and cls.__dataclass_params__.frozen:  # type: ignore[attr-defined]
         ruling = [name for name in ruling if name not in ("__setattr__", "__delattr__")]
     foreign = [c for c in cls.__mro__ if c not in _NEUTRAL and library(c) is not None]
@@ -152,6 +155,8 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     values = [new.attributes[key] for key in dict.fromkeys((name, _ANY)) if key in new.attributes]
     member = inspect.getattr_static(new.cls, name, None)
     if name in new.attributes or member is None:
+        finds = operator_of(walk, base, _MISSING)
+        values += [walk.function(finds, Given((base, captured(name))))] if finds else []
         return least_upper_bound(values or [OUTSIDE])  # without one it raises where it runs
     walk.captured(new.cls, name, getattr(new.cls, name))
     result, may_be_method = of_class(walk, base, member), hasattr(type(member), "__get__")
@@ -278,6 +283,25 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
         return None
     walk.captured(cls, name, function)
     return function
+
+
+def iterates(walk: Walk, value: KnownValue) -> bool:
+    """Walk the methods of somebody's class that go through an object; return if there are any."""
+    method = operator_of(walk, value, "__iter__")
+    if method is None:
+        return False
+    result = walk.function(method, Given((value,)))
+    choices = result.known.choices if isinstance(result.known, OneOf) else (result,)
+    for choice in choices:
+        following = operator_of(walk, choice, "__next__")
+        if following is not None:
+            walk.function(following, Given((choice,)))
+    return True
+
+
+def may_be_called(thing: object) -> bool:
+    """Whether a thing may be called: of objects that the call has made, by their classes."""
+    return not isinstance(thing, Instance) or any("__call__" in vars(c) for c in thing.cls.__mro__)
 
 
 def asks_what_is_there(function: object, places: Sequence[KnownValue]) -> bool:

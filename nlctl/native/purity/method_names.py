@@ -4,15 +4,6 @@ from ...expressions.effects import CHANGING as CHANGING
 from ...expressions.effects import IN_PLACE as IN_PLACE
 from ...expressions.effects import WRITERS as WRITERS
 
-# functions and methods that may return part of what they are given
-VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
-         "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
-         "expand_dims", "broadcast_to", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90",
-         "real", "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num",
-         "to_numpy", "sliding_window_view", "asmatrix", "frombuffer", "require",
-         "asarray_chkfinite"}  # fmt: skip
-LISTS_OF_VIEWS = {"broadcast_arrays", "split", "array_split", "hsplit", "vsplit", "dsplit",
-                  "unstack", "meshgrid"}  # fmt: skip
 # of tables and columns of pandas, without inplace=True
 _OF_COLUMNS = {"abs", "idxmax", "idxmin", "sort_values", "sort_index", "set_index", "reset_index",
                "fillna", "dropna", "cummax", "cummin", "reindex", "to_dict", "iterrows",

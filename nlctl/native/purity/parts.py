@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from abc import ABCMeta
 from collections.abc import Sequence
 from dataclasses import replace
 from types import FunctionType, ModuleType
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .texts import named_by
 from .values import (
     OUTSIDE,
     PLAIN,
@@ -19,6 +21,7 @@ from .values import (
     KnownValue,
     OneOf,
     RowOf,
+    TextLike,
     Unknown,
     captured,
     choice_among,
@@ -79,12 +82,19 @@ def names_read(
     """Return which attributes `getattr` may read: the one that is named, or all or a default."""
     if isinstance(name.known, str):
         return [name.known], ()
-    thing = base.known
+    thing, text = base.known, name.known
     cls = thing.cls if isinstance(thing, Instance) else type(thing)
-    if isinstance(thing, Unknown | OneOf | type | ModuleType) or library(cls) is not None:
+    holds_functions = isinstance(thing, ModuleType) or type(thing) in (type, ABCMeta)
+    of_others = library(thing if holds_functions else cls) is not None
+    if (
+        isinstance(thing, Unknown | OneOf)
+        or of_others
+        or (holds_functions and not isinstance(text, TextLike))
+    ):
         raise Impure("calls getattr() by a name that is only known when it runs", "write it")
     held = thing.attributes if isinstance(thing, Instance) else getattr(thing, "__dict__", {})
-    return sorted(n for n in {*held, *dir(cls)} if not n.startswith("__")), others
+    names = sorted(n for n in {*held, *dir(thing if holds_functions else cls)} if n[:2] != "__")
+    return named_by(names, text) if isinstance(text, TextLike) else names, others
 
 
 def is_plain_attribute(thing: object, name: str) -> bool:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from ...expressions.source import Definition, Unreadable, definition
-from . import made
-from .expressions import CHANGES, OPERATORS, Expressions, Frame
-from .known_calls import CONTAINERS, MEMORY
+from . import made, operators
+from .checked import MEMORY
+from .expressions import CHANGES, Expressions, Frame
+from .known_calls import CONTAINERS
 from .local_classes import class_defined_in, constants_in_class
 from .values import (
     FRESH,
@@ -34,6 +35,7 @@ from .values import (
     element,
     forgotten,
     holder,
+    is_one_of,
     least_upper_bound,
     library,
     was_there,
@@ -142,11 +144,11 @@ class CallWalker(Expressions):
         self, node: ast.AugAssign, value: KnownValue, added: KnownValue
     ) -> KnownValue:
         """Return what an object becomes by ``+=`` and its kind."""
-        name = OPERATORS.get(type(node.op), "")
+        name = operators.OPERATORS.get(type(node.op), "")
         operator = made.operator_of(self.walk, value, f"__i{name}__")
         if operator is not None:
             return self.walk.function(operator, Given((value, added)))
-        return self.operated(type(node.op), value, added)
+        return operators.operated(self.walk, type(node.op), value, added)
 
     def visit_Delete(self, node: ast.Delete) -> None:
         for target in node.targets:
@@ -237,7 +239,8 @@ class CallWalker(Expressions):
             for part in ast.walk(case.pattern):
                 name = getattr(part, "name", None) or getattr(part, "rest", None)
                 if name:
-                    self.assign(name, KnownValue(subject.own and subject.inside, subject.inside))
+                    is_own = subject.own and subject.inside
+                    self.assign(name, KnownValue(is_own, subject.inside, rank=subject.rank))
                 if isinstance(part, ast.MatchSingleton) and part.value is not None:
                     self.walk.numba_differs += ["identity"]  # one of NumPy's is not the True
                 if isinstance(part, ast.MatchClass):
@@ -288,7 +291,7 @@ class CallWalker(Expressions):
         for item in node.items:
             call = item.context_expr
             entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
-            plain = entered in (np.errstate, contextlib.suppress, warnings.catch_warnings)
+            plain = is_one_of(entered, (np.errstate, contextlib.suppress, warnings.catch_warnings))
             if not plain or item.optional_vars is not None:
                 left.append(self.entered(item))
             ends_early |= entered is contextlib.suppress
@@ -320,7 +323,8 @@ class CallWalker(Expressions):
         call = node.value if isinstance(node, ast.Expr) else None
         if not isinstance(call, ast.Call):
             return False
-        return self.visit(call.func).known in (warnings.simplefilter, warnings.filterwarnings)
+        called = self.visit(call.func).known
+        return is_one_of(called, (warnings.simplefilter, warnings.filterwarnings))
 
     def visit_Import(self, node: ast.Import) -> None:
         for alias in node.names:

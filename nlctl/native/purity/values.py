@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import inspect
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import EnumType, Flag
@@ -26,8 +27,22 @@ class Attributes(Unknown):
     of: KnownValue
 
 
+@dataclass(frozen=True)
+class TextLike(Unknown):
+    """A text that is only known when the function runs, and by what it is matched."""
+
+    pattern: str
+
+    @classmethod
+    def of(cls, pattern: str) -> TextLike | None:
+        """Return it by its pattern, None where that is too much to follow."""
+        return cls(pattern) if len(pattern) <= _LONGEST else None
+
+
 UNKNOWN_VALUE = Unknown()
-ARRAYS = Unknown()  # what holds numbers and arrays alone
+MAYBE_NONE = Unknown()  # None, or something else
+_RANKS = 32  # indices of an array, beyond which it is not followed
+_LONGEST = 400  # characters of a pattern of texts
 _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
@@ -161,6 +176,9 @@ class KnownValue:
     # whether it keeps what is put into it (lists, tuples, dicts), instead of copying numbers
     holds: bool = False
     known: Any = UNKNOWN_VALUE  # the object itself, if it was there before the call
+    # of an array that it has not made, how many indices reach a number, at most: fewer reach
+    # a view, through which the array is written into
+    rank: int | None = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, KnownValue) and self.marks == other.marks
@@ -172,13 +190,21 @@ class KnownValue:
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
         kinds = Local | OneOf | ListOf | RowOf | Bound | Cached | Pure | Instance | Parent
-        kinds |= Attributes
+        kinds |= Attributes | ArraysOf | TextLike
         known = self.known if isinstance(self.known, kinds) else id(self.known)
-        return self.own, self.inside, self.holds, known
+        return self.own, self.inside, self.holds, self.rank, known
+
+
+@dataclass(frozen=True)
+class ArraysOf(Unknown):
+    """A list or tuple that the call has made of numbers and arrays alone."""
+
+    part: KnownValue
+    count: int | None = None  # of a tuple that is written out
 
 
 FRESH = KnownValue(True, True)
-VECTOR = KnownValue(False, True)  # numbers that belong to the caller
+VECTOR = KnownValue(False, True, rank=1)  # numbers that belong to the caller
 OUTSIDE = KnownValue(False, False, True)
 SLICE = KnownValue(True, True, known=slice(None))
 
@@ -188,7 +214,8 @@ def captured(thing: object) -> KnownValue:
     if isinstance(thing, (*PLAIN, Flag)):
         return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
-        return KnownValue(False, thing.ndim <= 1, known=thing)
+        is_open = thing.dtype.hasobject or thing.dtype.names or isinstance(thing, np.matrix)
+        return replace(view(OUTSIDE, None if is_open else thing.ndim), known=thing)
     numbers = isinstance(thing, tuple | list | dict | set | frozenset) and all(
         isinstance(v, PLAIN) for v in (thing.values() if isinstance(thing, dict) else thing)
     )
@@ -198,12 +225,30 @@ def captured(thing: object) -> KnownValue:
 def least_upper_bound(values: Iterable[KnownValue]) -> KnownValue:
     """Return what holds for each of several values."""
     values = list(values) or [FRESH]
-    return KnownValue(
-        own=all(v.own for v in values),
+    slices = [v for v in values if isinstance(v.known, slice)]
+    return KnownValue(  # what may be a slice or a number chooses what may be a view
+        own=all(v.own for v in values) and len(slices) in (0, len(values)),
         inside=all(v.inside for v in values),
         holds=any(v.holds for v in values),
         known=_of_any(values),
+        rank=greatest_rank(v for v in values if not v.own),
     )
+
+
+def greatest_rank(values: Iterable[KnownValue]) -> int | None:
+    """Return how many indices reach a number of each of several arrays."""
+    ranks = [v.rank for v in values]
+    known = [rank for rank in ranks if rank is not None]
+    return max(known) if known and len(known) == len(ranks) else None
+
+
+def view(value: KnownValue, rank: int | None) -> KnownValue:
+    """Return what is known of a view of an array, a number of which so many indices reach."""
+    if value.own:
+        return replace(forgotten(value), holds=False)
+    if rank is None or rank > _RANKS:
+        return KnownValue(False, False)
+    return KnownValue(False, rank <= 1, rank=max(rank, 0))
 
 
 def _of_any(values: list[KnownValue]) -> Any:
@@ -211,6 +256,8 @@ def _of_any(values: list[KnownValue]) -> Any:
     first = values[0].known
     if all(v.known is first for v in values):
         return first
+    if all(isinstance(v.known, slice) for v in values):
+        return SLICE.known
     if all(isinstance(v.known, Instance) for v in values):
         if any(v.known.cls is not first.cls for v in values):
             return OneOf(tuple(values))
@@ -220,9 +267,19 @@ def _of_any(values: list[KnownValue]) -> Any:
     if all(isinstance(v.known, RowOf) and len(v.known.parts) == _width(first) for v in values):
         columns = zip(*(v.known.parts for v in values), strict=True)
         return RowOf(tuple(map(least_upper_bound, columns)))
+    if all(isinstance(v.known, ArraysOf) for v in values):
+        counts = {v.known.count for v in values}
+        part = least_upper_bound(v.known.part for v in values)
+        return ArraysOf(part, counts.pop() if len(counts) == 1 else None)
     if all(isinstance(v.known, ListOf) for v in values):
         return ListOf(tuple(dict.fromkeys(c for v in values for c in v.known.choices)))
-    return function_choice(values)
+    if all(isinstance(v.known, str | TextLike) for v in values):
+        texts = (v.known for v in values)
+        patterns = [re.escape(k) if isinstance(k, str) else k.pattern for k in texts]
+        return TextLike.of("|".join(dict.fromkeys(patterns))) or UNKNOWN_VALUE
+    choice = function_choice(values)
+    is_open = any(v.known is None or v.known is MAYBE_NONE for v in values)
+    return MAYBE_NONE if is_open and choice is UNKNOWN_VALUE else choice
 
 
 def _width(row: Any) -> int:
@@ -232,6 +289,8 @@ def _width(row: Any) -> int:
 def row(values: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of a tuple of these."""
     held = holder(values)
+    if isinstance(held.known, ArraysOf):
+        held = replace(held, known=replace(held.known, count=len(values)))
     is_mixed = isinstance(held.known, Unknown) and any(
         isinstance(function_choice([v]), OneOf) or not (v.own or v.holds) for v in values
     )
@@ -240,13 +299,18 @@ def row(values: Sequence[KnownValue]) -> KnownValue:
 
 def element(value: KnownValue) -> KnownValue:
     """Return what is known of an element, whichever it is."""
-    known, holds = value.known, value.holds and value.known is not ARRAYS
-    plain = KnownValue(value.inside, value.inside, holds)
+    known = value.known
+    if value.rank is not None and not value.own:
+        return view(value, value.rank - 1) if value.rank > 1 else FRESH
+    if isinstance(known, ArraysOf):
+        return known.part
+    plain = KnownValue(value.inside, value.inside, value.holds)
     if isinstance(known, ListOf):
         return least_upper_bound(known.choices)
     if isinstance(known, OneOf):
-        inner = [element(c) for c in known.choices if isinstance(c.known, list | tuple)]
-        if len(inner) == len(known.choices):
+        lists = [c for c in known.choices if isinstance(c.known, list | tuple)]
+        inner = [element(c) for c in lists if c.known]  # of an empty one there is none
+        if inner and len(lists) == len(known.choices):
             return replace(plain, known=_of_any(inner))
         return least_upper_bound([plain, *inner]) if inner else replace(plain, known=known)
     if isinstance(known, Pure):
@@ -261,6 +325,8 @@ def element(value: KnownValue) -> KnownValue:
 def one_among(value: KnownValue, parts: Iterable[Any]) -> KnownValue:
     """Return what is known of one of the parts of a list that was there before the call."""
     parts = list(parts)
+    if parts and all(isinstance(part, slice) for part in parts):
+        return SLICE
     if parts and all(isinstance(part, (*PLAIN, np.ndarray)) for part in parts):
         return forgotten(least_upper_bound(map(captured, parts)))
     return replace(value, known=choice_among(parts))
@@ -282,19 +348,18 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
     values = list(values)
     known = function_choice(values)
     known = ListOf(tuple(values)) if isinstance(known, OneOf) else known
-    if known is UNKNOWN_VALUE and not any(v.holds for v in values):
-        known = ARRAYS
+    is_index = any(isinstance(v.known, slice | None) or v.known is MAYBE_NONE for v in values)
+    if known is UNKNOWN_VALUE and not is_index and not any(v.holds for v in values):
+        known = ArraysOf(forgotten(least_upper_bound(values)))
     return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 
 
 def function_choice(values: Iterable[KnownValue]) -> Any:
-    """Return the choice between functions; UNKNOWN where not all values are functions."""
+    """Return the choice between functions or objects, and None; UNKNOWN between others."""
     values = tuple(values)
     kinds = Local | Bound | Cached | OneOf | ListOf | RowOf | Instance | Pure
-    functions = all(
-        isinstance(v.known, kinds) or callable(v.known) or is_somebodys(v.known) for v in values
-    )
-    if not values or not functions:
+    given = [v.known for v in values if v.known is not None]  # None is none of them
+    if not given or not all(isinstance(k, kinds) or callable(k) or is_somebodys(k) for k in given):
         return UNKNOWN_VALUE
     flat = [c for v in values for c in (v.known.choices if isinstance(v.known, OneOf) else (v,))]
     return OneOf(tuple(dict.fromkeys(flat))) if len(flat) <= _CHOICES else UNKNOWN_VALUE
@@ -312,6 +377,20 @@ def was_there(thing: object) -> bool:
     return is_somebodys(thing) and not isinstance(thing, kinds)
 
 
+def is_one_of(thing: object, several: Iterable[object]) -> bool:
+    """Whether a thing is one of several, without asking its class what is equal to it."""
+    return any(thing is one for one in several)
+
+
+def has_no_truth(thing: object) -> bool:
+    """Whether a thing is true or false without code of somebody: None, a list, a plain object."""
+    cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    if thing is None or isinstance(thing, ListOf | RowOf):
+        return True
+    is_plain = all(getattr(cls, name, None) is None for name in ("__bool__", "__len__"))
+    return is_plain and (isinstance(thing, Instance) or was_there(thing))
+
+
 def is_itself_alone(value: KnownValue) -> bool:
     """Whether a value is an object that was there before, and equal to itself alone."""
     every = value.known.choices if isinstance(value.known, OneOf) else (value,)
@@ -320,7 +399,7 @@ def is_itself_alone(value: KnownValue) -> bool:
 
 def maybe_shared(value: KnownValue) -> KnownValue:
     """Return what is known of a list that may have been given what the call has not made."""
-    known = UNKNOWN_VALUE if value.known is ARRAYS else value.known
+    known = UNKNOWN_VALUE if isinstance(value.known, ArraysOf) else value.known
     return replace(value, inside=False, known=known)
 
 

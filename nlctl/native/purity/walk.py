@@ -107,7 +107,7 @@ class Walk(ABC):
             before = 0.0
         if name:
             kept = least_upper_bound([captured(before), value])
-            self._register(register, KnownValue(kept.own, kept.inside, kept.holds))
+            self._register(register, replace(kept, known=WORKSPACE.known))
         elif isinstance(thing, list):
             self._register(register, replace(WORKSPACE, holds=True))
         return True
@@ -147,6 +147,17 @@ class Walk(ABC):
         """Return an object that the call has made, of which nothing is known yet."""
         self.objects.append(Instance(cls))
         return self.objects[-1]
+
+    def made_once(self, place: tuple[Any, Any], result: KnownValue) -> KnownValue:
+        """Return one object for all that a call makes in a loop, which is walked again."""
+        if not isinstance(result.known, Instance):
+            return result
+        before = self.made.get(place)
+        if before is not None and before.known.cls is result.known.cls:
+            before.known.absorb(result.known)
+            result = replace(result, known=before.known)
+        self.made[place] = result
+        return result
 
     def note(self, notes: Iterable[Captured]) -> None:
         """Keep notes of what a function or an object consists of."""
