@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from .graph import ADDITIVE, OF_FACTORS, Expr, needed
+from .graph import LINEAR, OF_FACTORS, Expr, needed
 
 # each element of the result depends on all that goes in
-_WHOLE = ("sum", "call", "solve", *ADDITIVE, *OF_FACTORS)
+_WHOLE = ("sum", "call", "solve", *LINEAR, *OF_FACTORS)
 ADDITIVE = ("add", "sub", "neg", "sum", "item", "slice", "concat")  # in what they are made of
 
 
