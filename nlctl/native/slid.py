@@ -372,7 +372,7 @@ def compare_sides(
     read, original = slid.equations_with(whole), compiled.equations_with(p)
     functions = declared_functions(read.results, slid.program.switching)
     levels = read.conditions.levels  # of what jumps at integers: declared is 1 where it is not met
-    met = [(functions | levels)[rows[0]] for rows in slide_rows(slid)]
+    met = [{**functions, **levels}[rows[0]] for rows in slide_rows(slid)]
     extended[modes] = np.sign(_values(met, there))
     for name, width in (("dx", states), ("y", compiled.system.noutputs or 0)):
         right, now = (
