@@ -39,6 +39,7 @@ from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 from .schedule import Sent
 
+_STEPS_FIRST, _STEPS_MORE = 20_000, 100  # then so many times as the run without derivatives takes
 _STEP, _PART = 1e-9, 1e-4  # how long steps of held inputs take: of the run, and of an interval
 
 
@@ -82,12 +83,16 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
     named = signals, quantities
-    one = _integrated(compiled, run, named, (u, x0, p, scale))
+    one = _integrated(compiled, _at_most(run, _STEPS_FIRST), named, (u, x0, p, scale))
     slid = _slid(compiled, run, one.reached, (u, x0, p))
+    done = slid.reached.statistics
+    further = _at_most(run, _STEPS_FIRST + _STEPS_MORE * (done.accepted + done.rejected))
     if slid.slides:
         x0 = with_modes(x0, len(slid.slides), run.times)
-        one = _integrated(slid.compiled, run, named, (u, x0, slid.p, scale))
+        one = _integrated(slid.compiled, further, named, (u, x0, slid.p, scale))
         one = replace(one, reached=slid.named(one.reached))
+    elif one.reached.statistics.status is Status.STEP_LIMIT:
+        one = _integrated(compiled, further, named, (u, x0, p, scale))
     differentiated, reached, start, whole = one.differentiated, one.reached, one.start, one.p
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
@@ -133,13 +138,20 @@ def _integrated(
     )  # fmt: skip
 
 
+def _at_most(run: RunWithDerivatives, steps: int) -> RunWithDerivatives:
+    """Return a run that ends after so many steps, or fewer if its settings say so."""
+    # Where rates have no bound derivatives may need steps without end: sqrt(abs(x)) through 0.
+    most = min(run.settings.max_steps, steps)
+    return replace(run, settings=replace(run.settings, max_steps=most))
+
+
 def _slid(
     compiled: Compiled, run: RunWithDerivatives, reached: Trajectory, given: tuple[np.ndarray, ...]
 ) -> SlidRun:
-    """Return the run without derivatives that slides, if the one with them switches without end."""
+    """Return the run without derivatives, which may slide, if the one with them has no end."""
     u, x0, p = given
     course = _course(compiled, run, u)
-    if reached.statistics.status not in (Status.ZENO, Status.CHATTERING):
+    if reached.statistics.status not in (Status.ZENO, Status.CHATTERING, Status.STEP_LIMIT):
         return SlidRun(compiled=compiled, p=p, reached=reached)
     return slid_from(course, run_once(course, x0, p), x0, p)
 

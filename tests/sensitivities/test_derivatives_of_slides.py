@@ -135,3 +135,27 @@ def test_there_is_no_derivative_behind_one_of_several_ways():
     assert "several ways" in lack.why
     assert np.isfinite(by.derivatives[0, 0, :3]).all()
     assert np.isnan(by.derivatives[0, 0, 3:]).all()
+
+
+def of_two_levels(t, x, u, params):
+    pushed = -3.0 if 1 < t < 2 else 0.0
+    return [pushed - np.sign(x[0] ** 2 - params["a"]) * np.sign(x[0])]
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-8, 1e-9, 1e-10])
+def test_levels_of_a_product_move_with_what_says_where_they_are(rtol):
+    """At rest at sqrt(a), then pushed to -sqrt(a): +-1 / (2 sqrt(a)), and on the way what it left."""
+    block = ct.nlsys(of_two_levels, None, states=1, inputs=0, outputs=1, name="block",
+                     params={"a": 0.25})  # fmt: skip
+    times = np.array([0, 0.4, 0.8, 1.1, 1.6, 5.0])
+    by = nlctl.sensitivity_response(
+        block, times, 0, 1.0, with_respect_to=["a"], rtol=rtol, atol=rtol
+    )
+    assert not by.missing
+    assert len(by.statistics.slides) == 2
+    # Passed on at 0 from -2 to -4 by a factor of 2, and from -4 to -2 at -sqrt(a), which moves.
+    right = [0, 0, 1, 1, 0.5 * 2 - 0.5, -1]
+    left, at_zero = 1.0, 1.0 * 4 / 2
+    behind = -1.0 + (at_zero + 1.0) * 2 / 4  # what crosses -sqrt(a) later moves with it
+    right[4] = left - left + behind
+    assert by.derivatives[0, 0] == pytest.approx(right, abs=1e-6)

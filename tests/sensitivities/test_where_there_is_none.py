@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from closed_form_runs import Ball, block, jumping_rate
+from scipy.optimize import brentq
 
 import nlctl
 
@@ -393,3 +394,38 @@ def test_opaque_function():
         known, [0, 1], 0, [1e-8], with_respect_to=["plant.a", "plant.x(0)"]
     )
     assert np.allclose(made.derivatives, exact.derivatives, rtol=0, atol=1e-6)
+
+
+def through_a_root(t, x, u, params):
+    return [params["a"] + np.sqrt(np.abs(x[0]))]
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-11])
+def test_rates_without_a_bound_end_derivatives_or_have_them(rtol):
+    """x' = a + sqrt|x| from -1: t = 2 (r - a log(1 + r / a)) below 0, with r = sqrt|x|, and above.
+
+    The slope of the rate has no bound at 0: with small tolerances no number of steps leads past it.
+    """
+    plant = ct.nlsys(through_a_root, None, states=1, inputs=0, outputs=1, name="plant",
+                     params={"a": 1.0})  # fmt: skip
+    run = nlctl.sensitivity_response(
+        plant, [0, 0.5, 2.0], 0, -1.0, with_respect_to=["a"], rtol=rtol, atol=rtol
+    )
+    _, before, after = run.derivatives[0, 0]
+
+    def reached(a, t):
+        def passed(x):
+            def from_zero(r):
+                return 2 * (r - a * np.log1p(r / a))
+
+            begin = from_zero(1.0)
+            r = np.sqrt(abs(x))
+            return begin - from_zero(r) if x < 0 else begin + from_zero(r)
+
+        return brentq(lambda x: passed(x) - t, -1.0, 5.0, xtol=1e-14)
+
+    slopes = [(reached(1 + 1e-5, t) - reached(1 - 1e-5, t)) / 2e-5 for t in (0.5, 2.0)]
+    assert before == pytest.approx(slopes[0], rel=1e-5)
+    assert np.isnan(after) or after == pytest.approx(slopes[1], rel=1e-4)
+    assert np.isnan(after) == (rtol < 1e-8)
+    assert ("cannot be integrated further" in str(run)) == (rtol < 1e-8)
