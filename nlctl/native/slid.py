@@ -274,10 +274,7 @@ class SlidRun:
         states, inputs = original.system.nstates or 0, original.schedule.ninputs
         reached, jump = self.reached, self.reached.statistics.jump
         if jump is not None:
-            jump = replace(
-                jump, before=jump.before[:states], after=jump.after[:states],
-                inputs=jump.inputs[:inputs], crowd=None,
-            )  # fmt: skip
+            jump = jump.first(states, inputs)
         return self.named(
             replace(
                 reached, states=reached.states[:states], inputs=reached.inputs[:inputs],
@@ -362,8 +359,7 @@ def compare_sides(
     if jump is None:
         return
     states = compiled.system.nstates or 0
-    jump = replace(jump, after=jump.after[:states], inputs=jump.inputs[: compiled.schedule.ninputs])
-    given = _far_points(compiled, p, jump, 4)
+    given = _far_points(compiled, p, jump.first(states, compiled.schedule.ninputs), 4)
     places = slide_places(slid.schedule.nodes)
     modes = [slid.schedule.nodes[i].state_offset for i in places]
     extended = np.ones((slid.system.nstates or 0, _AROUND))

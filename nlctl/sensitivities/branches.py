@@ -104,15 +104,17 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
     const, other = graph.const, numbers[-1]
     level = other if op == "copysign" else numbers[0]
     margin = graph.op("mul", kept, level)
-    if op == "sign":
+    if op in ("sign", "heaviside"):  # at 0 they are on a side of its own
         at_zero = graph.op("neg", graph.op("absolute", level))
         margin = graph.op("select", graph.op("eq", kept, const(0.0)), at_zero, margin)
-        return _side_of(graph, graph.op("sign", level), level, [level], margin, kept)
+        value, now = kept, graph.op("sign", level)
+        if op == "heaviside":
+            below = graph.op("select", graph.op("lt", kept, const(0.0)), const(0.0), other)
+            value = graph.op("select", graph.op("gt", kept, const(0.0)), const(1.0), below)
+        return _side_of(graph, now, level, [level], margin, value)
     below = graph.op("lt", level, const(0.0))
     now = graph.op("select", below, const(-1.0), const(1.0))
-    if op == "heaviside":
-        value = graph.op("select", graph.op("gt", kept, const(0.0)), const(1.0), const(0.0))
-    elif op == "copysign":
+    if op == "copysign":
         value = graph.op("mul", graph.op("absolute", numbers[0]), kept)
     else:  # the angle jumps on the left half of the axis only
         reflected = graph.op("mul", const(math.pi), graph.op("sub", kept, now))

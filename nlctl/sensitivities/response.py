@@ -15,14 +15,14 @@ from ..errors import CompileError, InexactWarning
 from ..native import Compiled, Tableau, compile  # noqa: A004 (what it does)
 from ..native.audit import Trial, audit
 from ..native.diagram.checks import sized
-from ..native.driver import Course, begin, prepared, run_once, slid_from
+from ..native.driver import Course, begin, prepared, run_once
 from ..native.floats import with_floats
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings, solver_settings
-from ..native.slid import SlidRun, with_modes
+from ..native.slid import with_modes
 from ..native.spare import give_back
 from ..params import checked_times
 from ..responses.arguments import (
@@ -33,6 +33,7 @@ from ..responses.arguments import (
     state_array,
     with_aliases,
 )
+from .alone import run_alone
 from .missing import Arrays, commits_at_start, evaluated_rows, missing
 from .names import Observed, VariedQuantity, checked_names, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
@@ -84,7 +85,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     scale = np.array([abs(v) or 1.0 for v in values])
     named = signals, quantities
     one = _integrated(compiled, _at_most(run, _STEPS_FIRST), named, (u, x0, p, scale))
-    slid = _slid(compiled, run, one.reached, (u, x0, p))
+    slid = run_alone(_course(compiled, run, u), one.reached, x0, p)
     done = slid.reached.statistics
     further = _at_most(run, _STEPS_FIRST + _STEPS_MORE * (done.accepted + done.rejected))
     if slid.slides:
@@ -143,17 +144,6 @@ def _at_most(run: RunWithDerivatives, steps: int) -> RunWithDerivatives:
     # Where rates have no bound derivatives may need steps without end: sqrt(abs(x)) through 0.
     most = min(run.settings.max_steps, steps)
     return replace(run, settings=replace(run.settings, max_steps=most))
-
-
-def _slid(
-    compiled: Compiled, run: RunWithDerivatives, reached: Trajectory, given: tuple[np.ndarray, ...]
-) -> SlidRun:
-    """Return the run without derivatives, which may slide, if the one with them has no end."""
-    u, x0, p = given
-    course = _course(compiled, run, u)
-    if reached.statistics.status not in (Status.ZENO, Status.CHATTERING, Status.STEP_LIMIT):
-        return SlidRun(compiled=compiled, p=p, reached=reached)
-    return slid_from(course, run_once(course, x0, p), x0, p)
 
 
 def _at_its_end(reached: Trajectory, samples: int, outputs: int) -> Trajectory:

@@ -91,17 +91,26 @@ class KeptSides:
         graph, margins = self.source.graph, []
         one, behind = graph.const(1.0), graph.const(-1.0)
         for side in self.sides:
+            rests = None if side.timed else self._rests(side)
             for k in range(side.rows):
                 kept, now = graph.item(side.kept, k), graph.item(side.here.now, k)
-                if side.timed:
-                    same = graph.op("eq", kept, now)
-                    margins.append(graph.op("select", same, one, behind))
-                else:
-                    margins.append(graph.item(side.here.margin, k))
+                left, margin = graph.op("not", graph.op("eq", kept, now)), one
+                if rests is not None:
+                    margin = graph.item(side.here.margin, k)
+                    here = graph.op("eq", margin, graph.const(0.0))
+                    here = graph.op("and", here, graph.item(graph.number(rests), k))
+                    left = graph.op("and", left, here)
+                margins.append(graph.op("select", left, behind, margin))
         for m in self.source.switched:
             same = graph.op("eq", graph.leaf("x", m, None), self.memories[m])
             margins.append(graph.op("select", same, one, behind))
         return reduce(lambda a, b: graph.op("minimum", a, b), margins, one)
+
+    def _rests(self, side: KeptSide) -> Expr:
+        """Whether a level stays: at exactly 0 it is on no side, or on one where sign(0) is 0."""
+        flow = self.source.time(self.source.flow, delays_move=False)
+        (rate,) = self.source.changes([side.here.level], flow)
+        return self.source.graph.op("eq", rate, self.source.graph.const(0.0))
 
 
 def sides_of(source: EquationParts, first: int) -> KeptSides:

@@ -144,7 +144,7 @@ def of_two_levels(t, x, u, params):
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-8, 1e-9, 1e-10])
 def test_levels_of_a_product_move_with_what_says_where_they_are(rtol):
-    """At rest at sqrt(a), then pushed to -sqrt(a): +-1 / (2 sqrt(a)), and on the way what it left."""
+    """At rest at sqrt(a), then pushed to -sqrt(a): +-1 / (2 sqrt(a)); and on the way."""
     block = ct.nlsys(of_two_levels, None, states=1, inputs=0, outputs=1, name="block",
                      params={"a": 0.25})  # fmt: skip
     times = np.array([0, 0.4, 0.8, 1.1, 1.6, 5.0])
@@ -152,10 +152,62 @@ def test_levels_of_a_product_move_with_what_says_where_they_are(rtol):
         block, times, 0, 1.0, with_respect_to=["a"], rtol=rtol, atol=rtol
     )
     assert not by.missing
-    assert len(by.statistics.slides) == 2
-    # Passed on at 0 from -2 to -4 by a factor of 2, and from -4 to -2 at -sqrt(a), which moves.
-    right = [0, 0, 1, 1, 0.5 * 2 - 0.5, -1]
-    left, at_zero = 1.0, 1.0 * 4 / 2
-    behind = -1.0 + (at_zero + 1.0) * 2 / 4  # what crosses -sqrt(a) later moves with it
-    right[4] = left - left + behind
-    assert by.derivatives[0, 0] == pytest.approx(right, abs=1e-6)
+    # it passes 0 with -2 before and -4 behind, and -sqrt(a), which moves by -1, with -4 and -2
+    past_zero = 1.0 * 4 / 2
+    past_level = -1.0 + (past_zero + 1.0) * 2 / 4
+    assert by.derivatives[0, 0] == pytest.approx([0, 0, 1, 1, past_level, -1], abs=1e-6)
+
+
+def to_a_level(t, x, u, params):
+    return [-np.sign(x[0] - params["p"])]
+
+
+def to_a_level_of_a_square(t, x, u, params):
+    return [-np.sign(x[0] ** 2 - params["p"] ** 2)]
+
+
+def to_a_level_ever_faster(t, x, u, params):
+    return [-2 * np.sign(x[0] - params["p"]) * (1 + np.sin(t) / 2)]
+
+
+def until_it_is_not_above(t, x, u, params):
+    return [-1.0 if x[0] > params["p"] else 0.0]
+
+
+def by_steps_at_half(t, x, u, params):
+    return [0.5 - np.heaviside(x[0] - params["p"], 0.5)]
+
+
+@pytest.mark.parametrize("p", [0.25, 0.3, 0.5])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-11])
+@pytest.mark.parametrize(
+    "update",
+    [
+        to_a_level, to_a_level_of_a_square, to_a_level_ever_faster, until_it_is_not_above,
+        by_steps_at_half,
+    ],
+)  # fmt: skip
+def test_rest_at_a_level_moves_with_the_level(update, p, rtol):
+    """Whether it slides there, or rests because sign(0) = 0 to the last digit: 1."""
+    block = ct.nlsys(update, None, states=1, inputs=0, outputs=1, name="block", params={"p": p})
+    by = nlctl.sensitivity_response(
+        block, [0, 0.2, 4.0, 5.0], 0, 1.0, with_respect_to=["p"], rtol=rtol, atol=rtol
+    )
+    assert by.derivatives[0, 0] == pytest.approx([0, 0, 1, 1], abs=1e-6 + 10 * rtol)
+    assert not by.missing
+
+
+def held_until_it_is_pushed(t, x, u, params):
+    return [(2.0 if 2 < t < 2.5 else 0.0) - np.sign(x[0] - params["p"])]
+
+
+@pytest.mark.parametrize("p", [0.25, 0.3, 0.5])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9])
+def test_rest_between_two_samples_counts(p, rtol):
+    """It comes to p at 1 - p, is pushed by 1 for half a second and comes back."""
+    block = ct.nlsys(held_until_it_is_pushed, None, states=1, inputs=0, outputs=1, name="block",
+                     params={"p": p})  # fmt: skip
+    by = nlctl.sensitivity_response(
+        block, [0, 0.2, 2.4, 5.0], 0, 1.0, with_respect_to=["p"], rtol=rtol, atol=rtol
+    )
+    assert by.derivatives[0, 0] == pytest.approx([0, 0, 1, 1], abs=1e-6 + 10 * rtol)

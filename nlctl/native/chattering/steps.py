@@ -1,7 +1,7 @@
 """Steps that a run has tried, as they are looked at: where they went, and a jump on their way."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -28,6 +28,13 @@ class Jump:
     def time(self) -> float:
         """Time of the jump (s)."""
         return self.times[1]
+
+    def first(self, states: int, inputs: int) -> "Jump":
+        """Return the jump in the first so many states and inputs."""
+        return replace(
+            self, before=self.before[:states], after=self.after[:states],
+            inputs=self.inputs[:inputs], crowd=None,
+        )  # fmt: skip
 
     def sides(self, wider: float = 0.0) -> list[tuple[float, np.ndarray, np.ndarray]]:
         """Return times, states and inputs on both sides, further apart by so many distances."""
