@@ -22,7 +22,7 @@ from ..native.jacobians import inexact
 from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings, solver_settings
-from ..native.slid import with_modes
+from ..native.slid import SlidRun, with_modes
 from ..native.spare import give_back
 from ..params import checked_times
 from ..responses.arguments import (
@@ -84,16 +84,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
     named = signals, quantities
-    one = _integrated(compiled, _at_most(run, _STEPS_FIRST), named, (u, x0, p, scale))
-    slid = run_alone(_course(compiled, run, u), one.reached, x0, p)
-    done = slid.reached.statistics
-    further = _at_most(run, _STEPS_FIRST + _STEPS_MORE * (done.accepted + done.rejected))
-    if slid.slides:
-        x0 = with_modes(x0, len(slid.slides), run.times)
-        one = _integrated(slid.compiled, further, named, (u, x0, slid.p, scale))
-        one = replace(one, reached=slid.named(one.reached))
-    elif one.reached.statistics.status is Status.STEP_LIMIT:
-        one = _integrated(compiled, further, named, (u, x0, p, scale))
+    one, slid = _as_far_as_it_goes(compiled, run, named, (u, x0, p, scale))
     differentiated, reached, start, whole = one.differentiated, one.reached, one.start, one.p
     _audit(compiled, reached, p, run)
     if reached.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
@@ -117,6 +108,27 @@ class _Integrated:
     start: np.ndarray  # its initial state
     p: np.ndarray  # and its parameters
     commits: list[Arrays]
+
+
+def _as_far_as_it_goes(
+    compiled: Compiled,
+    run: RunWithDerivatives,
+    named: tuple[Sequence[Observed], Sequence[VariedQuantity]],
+    given: tuple[np.ndarray, ...],
+) -> tuple[_Integrated, SlidRun]:
+    """Run a diagram with its derivatives, along what it slides; with the run without them."""
+    u, x0, p, scale = given
+    one = _integrated(compiled, _at_most(run, _STEPS_FIRST), named, given)
+    slid = run_alone(_course(compiled, run, u), one.reached, x0, p)
+    done = slid.reached.statistics
+    further = _at_most(run, _STEPS_FIRST + _STEPS_MORE * (done.accepted + done.rejected))
+    if slid.slides:
+        x0 = with_modes(x0, len(slid.slides), run.times)
+        one = _integrated(slid.compiled, further, named, (u, x0, slid.p, scale))
+        one = replace(one, reached=slid.named(one.reached))
+    elif one.reached.statistics.status is Status.STEP_LIMIT:
+        one = _integrated(compiled, further, named, given)
+    return one, slid
 
 
 def _integrated(

@@ -92,6 +92,12 @@ def guard_whole(graph: Graph, value: Tracer) -> None:
         graph.guard(finite, OverflowError)
 
 
+def python_integer(graph: Graph, name: str, value: Tracer) -> Tracer:
+    """Return an integer of Python's, by what a number is rounded by; there is none of NaN."""
+    guard_whole(graph, value)
+    return python_number(graph, graph.integer(elementwise(graph, name, value).only))
+
+
 class Builtins:
     """What a traced function finds as Python's builtins."""
 
@@ -154,9 +160,7 @@ class Builtins:
 
     def _whole(self, name: str, value: Tracer) -> Tracer:
         """Return an integer; Python raises an error where there is none."""
-        guard_whole(self.graph, value)
-        whole = self.graph.integer(elementwise(self.graph, name, value).only)
-        return python_number(self.graph, whole)
+        return python_integer(self.graph, name, value)
 
     def _round(self, value: Any, digits: Any = None) -> Any:
         if not isinstance(value, Tracer):

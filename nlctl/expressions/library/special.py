@@ -16,7 +16,6 @@ from ..operators import elementwise
 from . import integral_functions
 from .cells import by_numpy
 from .complex_numbers import ComplexPair
-from .creation import whole_numbers
 from .exponential import expm
 from .gamma import betaln, gamma, loggamma_of_size, lower_gamma, upper_gamma
 from .integral_functions import bessel, exponential_integral, macdonald, modified_bessel
@@ -31,7 +30,7 @@ from .linear_algebra import (
     of_triangles,
 )
 from .orthogonal import lyapunov, root_of_matrix, scipys_qr, sylvester
-from .python import guard_whole
+from .python import python_integer
 from .reductions import prod
 from .shapes import by_moving
 from .spectra import eigh, eigvals, eigvalsh, guard_finite, pinv, svd
@@ -332,8 +331,7 @@ def _whole(name: str) -> Any:
         value = traced(graph, x)
         if value.shape:
             raise Untraceable("a function of math of an array")
-        guard_whole(graph, value)
-        return whole_numbers(graph, elementwise(graph, name, value))
+        return python_integer(graph, name, value)
 
     return written
 
