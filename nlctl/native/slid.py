@@ -52,7 +52,7 @@ _AHEAD = 1e-9  # times the run's length: what comes no further has not slid
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
 _OWN = 2  # states of a relay: its mode, and when both sides have led away
 _ROUNDING = 1e-12  # of a time
-_ALIKE = 1e-9  # of rates
+_ALIKE = 1e-9  # of the largest rate
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
 
 
@@ -347,7 +347,7 @@ def _further(
         whole = _parameters(diagram, p, [far for _, far in slides], float(np.ptp(times)))
         compare_sides(compiled, diagram, p, whole, last.reached.statistics.jump)
         reached = run(diagram, with_modes(x0, len(slides), times), whole)
-    except (CompileError, ParameterError):
+    except (CompileError, ParameterError, Untraceable):
         return None
     return SlidRun(compiled=diagram, p=whole, reached=reached, slides=slides)
 
@@ -375,7 +375,8 @@ def compare_sides(
             _values([e for e, _ in equations.pieces(name)], arrays)[:width]
             for equations, arrays in ((original, given), (read, there))
         )
-        if not np.allclose(now, right, _ALIKE, 0.0, equal_nan=True):
+        largest = np.abs(right).max(axis=1, initial=0.0, where=np.isfinite(right), keepdims=True)
+        if not np.isclose(now, right, 0.0, _ALIKE * largest, equal_nan=True).all():
             raise CompileError("relays do not stand for the conditions that they were made for")
 
 

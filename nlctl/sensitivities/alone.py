@@ -39,6 +39,8 @@ def _where_it_ended(course: Course, done: Statistics, x0: np.ndarray, p: np.ndar
     compiled, before = course.compiled, course.times < done.time
     if done.jump is not None:
         return done.jump.first(compiled.system.nstates or 0, compiled.schedule.ninputs)
+    if not before.any():
+        return Jump(times=(done.time, done.time), before=x0, after=x0, inputs=course.inputs[:, 0])
     now = [[np.interp(done.time, course.times, row)] for row in course.inputs]
     inputs = np.hstack([course.inputs[:, before], np.reshape(now, (len(now), 1))])
     times = np.append(course.times[before], done.time)

@@ -18,7 +18,8 @@ from ..expressions.dependence import reads
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr
 from ..native import Compiled
-from ..native.happened import row_labels
+from ..native.equations.slides import declared_functions
+from ..native.happened import row_labels, slide_rows
 from ..native.integrate.state import Status
 from ..native.jacobians import searches_of
 from ..native.results import Trajectory
@@ -166,7 +167,20 @@ class _Run:
         """Return by what there are none, as the run starts on a condition that it moves."""
         source, sides = self.differentiated.sides.source, self.differentiated.sides.sides
         levels = [source.graph.item(s.here.level, k) for s in sides for k in range(s.rows)]
-        return self._where_met(levels, self._start, _START)
+        lacks = self._where_met(levels, self._start, _START)
+        return [*lacks, *self._where_moved(self._slides_at_start(), self._start, _START)]
+
+    def _slides_at_start(self) -> list[tuple[Expr, np.ndarray]]:
+        """Return the functions along which a run slides when it begins."""
+        # A relay has its function on a side, and next to it how far that is from where it rests.
+        equations = self.differentiated.sides.source.equations
+        levels, begun = equations.conditions.levels, list[tuple[Expr, np.ndarray]]()
+        declared = declared_functions(equations.results, self.compiled.program.switching)
+        for row, *_ in slide_rows(self.compiled):
+            _, rest, function = (levels.get(row) or declared[row]).args
+            (within,) = self._values([rest], self._start)
+            begun += [(function, np.array(True))] if np.all(within >= 0.0) else []
+        return begun
 
     def at_first_jump(self) -> list[NoDerivative]:
         """Return by what there are none, as what is sampled or driven at the start has two."""
@@ -198,6 +212,16 @@ class _Run:
         """Return by what there is none from when on: a level is 0, and later, and moves there."""
         met = self._zeros([(level, np.array(True)) for level in levels], at)
         met = self._zeros(met, later) if later and met else met
+        return self._where_moved(met, at, why, later)
+
+    def _where_moved(
+        self,
+        met: list[tuple[Expr, np.ndarray]],
+        at: dict[str, np.ndarray],
+        why: str,
+        later: dict[str, np.ndarray] | None = None,
+    ) -> list[NoDerivative]:
+        """Return by what there is none from when on: levels that are met move there."""
         if not met:
             return []
         later, zero, lacks = later or at, self.differentiated.sides.source.graph.const(0.0), []

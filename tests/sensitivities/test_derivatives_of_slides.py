@@ -211,3 +211,20 @@ def test_rest_between_two_samples_counts(p, rtol):
         block, [0, 0.2, 2.4, 5.0], 0, 1.0, with_respect_to=["p"], rtol=rtol, atol=rtol
     )
     assert by.derivatives[0, 0] == pytest.approx([0, 0, 1, 1], abs=1e-6 + 10 * rtol)
+
+
+def driven_at_a_level(t, x, u, params):
+    return [0.3 * np.sin(t) - np.sign(x[0] - params["p"]), params["q"] * x[0]]
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, -1e-12])
+def test_a_run_that_slides_from_its_start_has_none_by_what_moves_the_level(off):
+    """Moved by whatever little it starts on a side; by q, which moves nothing there, it has one."""
+    block = ct.nlsys(driven_at_a_level, None, states=2, inputs=0, outputs=2, name="block",
+                     params={"p": 0.25, "q": 1.0})  # fmt: skip
+    by = nlctl.sensitivity_response(
+        block, [0, 1.0, 2.0], 0, [0.25 + off, 0.0], with_respect_to=["p", "q", "block.x[0](0)"]
+    )
+    assert np.isnan(by.derivatives[:, [0, 2], 1:]).all()
+    assert "starts on a condition" in str(by)
+    assert by.derivatives[:, 1] == pytest.approx(np.array([[0, 0, 0], [0, 0.25, 0.5]]), abs=1e-6)
