@@ -23,6 +23,7 @@ from .events.location import (
     CLEAR,
     EVENT,
     REFUSED,
+    SHORT,
     jumped,
     locate,
     locate_jump,
@@ -136,7 +137,8 @@ def _counted(task, lane, w, event, j):
     if event and _jumps_at_kink(task, w, j):
         lane.noisy = 1
     step_accepted(lane, event, event and not _switches(task, w, j))
-    if misses > 0 and _from_zero(task, w, True, j):
+    is_short = lane.step < SHORT * lane.h  # a longer one has led somewhere: it is another condition
+    if misses > 0 and is_short and _from_zero(task, w, True, j):
         lane.misses = misses  # what shorter ones add to a state is lost in rounding
 
 

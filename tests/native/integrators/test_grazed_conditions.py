@@ -65,3 +65,28 @@ def test_a_state_that_stops_where_its_rate_ends(method, rtol):
             diagram, [0, 20], 0, [start], method=method, rtol=rtol, atol=1e-2 * rtol, audit=False
         ).states[0, -1]
         assert x == pytest.approx(600.0, abs=600.0 * rtol)
+
+
+def next_to_what_is_always_zero(t, x, u, params):
+    """A staircase that holds x[0], cut twice: the second cut has a function that stays 0."""
+    steps = np.trunc((x[0] + 0.3189 * np.tanh(x[1])) / 0.1088).astype(int) * 0.1088
+    pulses = 1.466 * (np.trunc(t / 0.1153).astype(int) % 2)
+    sides = np.sign(x[1] - 0.2513 * np.sin(1.028 * t)) * np.sign(1.438 * x[0] + 0.2588 * x[1])
+    return [
+        -1.978 * x[0] - 0.3626 * x[1] - 0.3818 * steps,
+        -0.9219 * x[1] - 0.07964 * x[2] + pulses,
+        -1.517 * x[2] - 0.3621 * x[0] + 0.9022 * np.sin(1.923 * t) - 0.9476 * sides,
+    ]
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("method", ["tsit5", "auto", "taylor"])
+def test_a_condition_that_stays_zero_widens_no_step_across_another(method, rtol):
+    """The stiff method is the reference: a step across was 0.07 s long."""
+    loop, times = compiled(next_to_what_is_always_zero, 3), np.linspace(0, 8, 41)
+    start = [0.6647856352638082, -0.06674310019151375, 0.8535402135207752]
+    run, reference = (
+        nlctl.input_output_response(loop, times, 0, start, method=name, rtol=tol, atol=1e-2 * tol)
+        for name, tol in ((method, rtol), ("rodas5p", 1e-10))
+    )
+    np.testing.assert_allclose(run.states, reference.states, rtol=0, atol=10 * rtol)

@@ -241,7 +241,7 @@ def next_try(task, lane, w, bad, j):
     close = _close(task, lane)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
-        if task.fixed == 0.0 and (_leaps(task, lane, w, j) or _costs_too_much(task, lane, w, j)):
+        if task.fixed == 0.0 and _leaps(task, lane, w, j):
             lane.whole, lane.misses = lane.high, 0  # what was tried first says nothing
             close = _close(task, lane)
         if lane.high <= 2.0 * close:
