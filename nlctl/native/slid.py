@@ -107,8 +107,6 @@ def _far_points(compiled: Compiled, p: np.ndarray, jump: Jump, seed: int) -> dic
     rng = np.random.default_rng(seed)
     x, u, t = (np.atleast_1d(v)[:, None] for v in (jump.after, jump.inputs, jump.time))
     x, u, t = (v + rng.normal(size=(len(v), _AROUND)) * (1.0 + np.abs(v)) for v in (x, u, t))
-    still = [*compiled.program.memory, *compiled.program.sampled]
-    x[still] = jump.after[still, None]
     return {"t": t, "x": x, "u": u, "p": p[:, None]}
 
 
@@ -156,8 +154,17 @@ class _Around:
                 groups.append([(row, s)])
             else:
                 alike.append((row, s))
-        slides = [self._slide([row for row, _ in g], [rows[row] for row, _ in g]) for g in groups]
+        slides = [self._of_group({row: rows[row] for row, _ in group}) for group in groups]
         return [slide for slide in slides if slide is not None]
+
+    def _of_group(self, group: dict[int, Expr]) -> tuple[Slide, float] | None:
+        """Return the slide of conditions that change together here, of those that compare."""
+        # Where a play is in contact, what it is compared with moves along: that is another place.
+        jumping = {
+            row: function for row, function in group.items()
+            if changing_at(self.graph, self._every, [function])
+        }  # fmt: skip
+        return self._slide([*jumping], [*jumping.values()]) if jumping else None
 
     def _slide(self, rows: Sequence[int], functions: list[Expr]) -> tuple[Slide, float] | None:
         """Return a slide of conditions that change together, if rates jump there as it has them."""

@@ -196,3 +196,26 @@ def test_where_one_side_leads_away_there_is_one_way():
     assert run.statistics.slides
     assert run.statistics.forks == ()
     assert "forks" not in str(run)
+
+
+def drawn_to_zero(t, x, u, params):
+    return [-1.2 * x[0] - np.sign(x[0]), u[0] - x[1]]
+
+
+@methods
+@pytest.mark.parametrize("start", [-0.65, 0.4, 1.0])
+def test_it_slides_where_a_sign_jumps_and_not_where_a_play_turns(method, start):
+    """The play is in contact where x comes to rest: both change together there alone."""
+    plant = ct.nlsys(
+        drawn_to_zero, lambda t, x, u, p: x, states=2, inputs=["v"], outputs=["u", "z"],
+        name="plant",
+    )  # fmt: skip
+    gap = nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.2, c_l=-0.1)
+    loop = nlctl.interconnect({"gap": gap, "plant": plant}, outputs=["u", "v", "z"])
+    times = np.linspace(0, 3, 31)
+    run = nlctl.input_output_response(loop, times, 0, {"plant.x[0]": start}, method=method)
+    size = np.maximum((abs(start) + 1 / 1.2) * np.exp(-1.2 * times) - 1 / 1.2, 0.0)
+    np.testing.assert_allclose(run.outputs[0], np.sign(start) * size, rtol=0, atol=1e-6)
+    right = max(start - 0.2, 0.0) if start > 0 else min(start + 0.1, 0.0)
+    right = min(max(right, -0.2), 0.1)  # what it is left at by u = 0
+    np.testing.assert_allclose(run.outputs[1, -1], right, rtol=0, atol=1e-6)
