@@ -50,7 +50,7 @@ _AROUND = 64  # points
 _NEAR = 0.25  # of a step: how far from its jump it is looked at
 _AHEAD = 1e-9  # times the run's length: what comes no further has not slid
 _RATE = 10.0  # at which what is left of a switching function decays, times the run's length
-_OWN = 2  # states of a relay: its mode, and when both sides have led away
+_OWN = len(RelayOfCondition.states)
 _ROUNDING = 1e-12  # of a time
 _ALIKE = 1e-9  # of the largest rate
 _REST_RATE = 1e3  # times as much of its rate as of itself counts as rest, in 1/s
@@ -327,7 +327,7 @@ def sliding(
         more = slides_at(last.compiled, last.p, jump, scale)
         if not more and _has_loops(compiled):
             return sliding(run, _in_numbers(compiled), reached, start, times)
-        tried = (_further(run, compiled, last, each, start, times) for each in more)
+        tried = (_further(run, compiled, (last, jump), each, start, times) for each in more)
         if (further := next(filter(None, tried), None)) is None:
             break
         last = further
@@ -341,18 +341,18 @@ def sliding(
 def _further(
     run: Callable[[Compiled, np.ndarray, np.ndarray], Trajectory],
     compiled: Compiled,
-    last: SlidRun,
+    ended: tuple[SlidRun, Jump],
     more: Slides,
     start: tuple[np.ndarray, np.ndarray],
     times: np.ndarray,
 ) -> SlidRun | None:
     """Return a run with relays for more conditions, None if they cannot be read."""
-    x0, p = start
+    (last, jump), (x0, p) = ended, start
     slides = (*last.slides, *((_counted(slide, last.slides), far) for slide, far in more))
     try:
         diagram = with_relays(compiled, tuple(slide for slide, _ in slides), p)
         whole = _parameters(diagram, p, [far for _, far in slides], float(np.ptp(times)))
-        compare_sides(compiled, diagram, p, whole, last.reached.statistics.jump)
+        compare_sides(compiled, diagram, p, whole, jump)
         reached = run(diagram, with_modes(x0, len(slides), times), whole)
     except (CompileError, ParameterError, Untraceable):
         return None
@@ -360,11 +360,9 @@ def _further(
 
 
 def compare_sides(
-    compiled: Compiled, slid: Compiled, p: np.ndarray, whole: np.ndarray, jump: Jump | None
+    compiled: Compiled, slid: Compiled, p: np.ndarray, whole: np.ndarray, jump: Jump
 ) -> None:
     """Refuse a diagram whose rates and outputs are others with each relay on its side, anywhere."""
-    if jump is None:
-        return
     states = compiled.system.nstates or 0
     given = _far_points(compiled, p, jump.first(states, compiled.schedule.ninputs), 4)
     places = slide_places(slid.schedule.nodes)
@@ -373,10 +371,7 @@ def compare_sides(
     extended[:states] = given["x"]
     there = given | {"x": extended, "p": whole[:, None]}
     read, original = slid.equations_with(whole), compiled.equations_with(p)
-    functions = declared_functions(read.results, slid.program.switching)
-    levels = read.conditions.levels  # of what jumps at integers: declared is 1 where it is not met
-    met = [{**functions, **levels}[rows[0]] for rows in slide_rows(slid)]
-    extended[modes] = np.sign(_values(met, there))
+    extended[modes] = np.sign(_values(functions_of_relays(slid, read), there))
     for name, width in (("dx", states), ("y", compiled.system.noutputs or 0)):
         right, now = (
             _values([e for e, _ in equations.pieces(name)], arrays)[:width]
@@ -385,6 +380,13 @@ def compare_sides(
         largest = np.abs(right).max(axis=1, initial=0.0, where=np.isfinite(right), keepdims=True)
         if not np.isclose(now, right, 0.0, _ALIKE * largest, equal_nan=True).all():
             raise CompileError("relays do not stand for the conditions that they were made for")
+
+
+def functions_of_relays(slid: Compiled, read: Equations) -> list[Expr]:
+    """Return what each relay for a condition switches at: while it slides, how far it may go."""
+    functions = declared_functions(read.results, slid.program.switching)
+    levels = read.conditions.levels  # of what jumps at integers: declared is 1 where it is not met
+    return [{**functions, **levels}[rows[0]] for rows in slide_rows(slid)]
 
 
 def with_modes(x0: np.ndarray, count: int, times: np.ndarray) -> np.ndarray:

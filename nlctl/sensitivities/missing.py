@@ -18,11 +18,11 @@ from ..expressions.dependence import reads
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr
 from ..native import Compiled
-from ..native.equations.slides import declared_functions
-from ..native.happened import row_labels, slide_rows
+from ..native.happened import row_labels
 from ..native.integrate.state import Status
 from ..native.jacobians import searches_of
 from ..native.results import Trajectory
+from ..native.slid import functions_of_relays
 from .directions import SomeRows
 from .program import Differentiated
 from .record import NoDerivative
@@ -173,11 +173,12 @@ class _Run:
     def _slides_at_start(self) -> list[tuple[Expr, np.ndarray]]:
         """Return the functions along which a run slides when it begins."""
         # A relay has its function on a side, and next to it how far that is from where it rests.
-        equations = self.differentiated.sides.source.equations
-        levels, begun = equations.conditions.levels, list[tuple[Expr, np.ndarray]]()
-        declared = declared_functions(equations.results, self.compiled.program.switching)
-        for row, *_ in slide_rows(self.compiled):
-            _, rest, function = (levels.get(row) or declared[row]).args
+        equations, begun = (
+            self.differentiated.sides.source.equations,
+            list[tuple[Expr, np.ndarray]](),
+        )
+        for switched in functions_of_relays(self.compiled, equations):
+            _, rest, function = switched.args
             (within,) = self._values([rest], self._start)
             begun += [(function, np.array(True))] if np.all(within >= 0.0) else []
         return begun

@@ -85,13 +85,12 @@ class KeptSides:
                 same = graph.op("and", same, graph.op("eq", graph.leaf("x", m, None), kept))
         return graph.op("select", same, graph.const(1.0), graph.const(-1.0))
 
-    @property
+    @cached_property
     def margin(self) -> Expr:
         """What is at least 0 as long as nothing has left the side that is kept."""
         graph, margins = self.source.graph, []
         one, behind = graph.const(1.0), graph.const(-1.0)
-        for side in self.sides:
-            rests = None if side.timed else self._rests(side)
+        for side, rests in zip(self.sides, self._rest, strict=True):
             for k in range(side.rows):
                 kept, now = graph.item(side.kept, k), graph.item(side.here.now, k)
                 left, margin = graph.op("not", graph.op("eq", kept, now)), one
@@ -106,11 +105,14 @@ class KeptSides:
             margins.append(graph.op("select", same, one, behind))
         return reduce(lambda a, b: graph.op("minimum", a, b), margins, one)
 
-    def _rests(self, side: KeptSide) -> Expr:
-        """Whether a level stays: at exactly 0 it is on no side, or on one where sign(0) is 0."""
+    @property
+    def _rest(self) -> list[Expr | None]:
+        """Whether levels stay: at exactly 0 they are on no side, or on one where sign(0) is 0."""
+        graph, moving = self.source.graph, [side for side in self.sides if not side.timed]
         flow = self.source.time(self.source.flow, delays_move=False)
-        (rate,) = self.source.changes([side.here.level], flow)
-        return self.source.graph.op("eq", rate, self.source.graph.const(0.0))
+        rates = iter(self.source.changes([side.here.level for side in moving], flow))
+        zero = graph.const(0.0)
+        return [None if side.timed else graph.op("eq", next(rates), zero) for side in self.sides]
 
 
 def sides_of(source: EquationParts, first: int) -> KeptSides:
