@@ -39,7 +39,7 @@ def conditions(
 
 
 def _switches(node: Expr) -> bool:
-    if _asks_for_number(node):
+    if asks_for_number(node):
         return True
     if node.op in _OF_DIFFERENCES:
         moves = any(arg.varies for arg in node.args)
@@ -52,7 +52,7 @@ def _switches(node: Expr) -> bool:
     )
 
 
-def _asks_for_number(node: Expr) -> bool:
+def asks_for_number(node: Expr) -> bool:
     """Return whether a comparison says whether something is a number, as x != x does."""
     with_itself = node.op in ("eq", "ne") and node.args[0] is node.args[1]
     asks = with_itself or (node.op in ORDERS and _is_of_infinity(node))
@@ -61,7 +61,7 @@ def _asks_for_number(node: Expr) -> bool:
 
 def _is_always(node: Expr) -> bool:
     """Return whether a comparison never changes."""
-    return _is_of_infinity(node) and not _asks_for_number(node)
+    return _is_of_infinity(node) and not asks_for_number(node)
 
 
 def at_integers(node: Expr) -> bool:
@@ -89,7 +89,7 @@ def _of_truths(node: Expr) -> bool:
 def switching_function(graph: Graph, condition: Expr) -> Expr:
     """Return what changes its sign where a condition switches."""
     op, args = condition.op, [graph.number(arg) for arg in condition.args]
-    if _asks_for_number(condition):
+    if asks_for_number(condition):
         edges = domain_edges(graph, needed(args))
         return reduce(lambda a, b: graph.op("minimum", a, b), edges, graph.const(1.0))
     if op in _OF_DIFFERENCES:
@@ -121,7 +121,7 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
         return _at_even_and_odd(graph, _counted(graph, condition))
     if (passed := _table_passed(condition)) is not None:
         return _at_even_and_odd(graph, _place_in(graph, *passed))
-    if _asks_for_number(condition):
+    if asks_for_number(condition):
         return tuple(domain_edges(graph, needed(condition.args)))
     function = switching_function(graph, condition)
     if condition.op not in ORDERS:

@@ -203,6 +203,9 @@ class _Reader:
         diagonal = (graph.item(whole, k) for k in range(0, n * n, n + 1))
         return graph.op("mul", node, functools.reduce(lambda a, b: graph.op("add", a, b), diagonal))
 
+    def _still(self, node: Expr, part: Expr) -> None:
+        """It counts as fixed, whatever it is made of."""
+
     def _lu_regular(self, node: Expr, matrix: Expr) -> None:
         """It is the same almost everywhere."""
 

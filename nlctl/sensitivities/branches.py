@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..expressions.conditions import JUMPING, conditions, number_rooted
+from ..expressions.conditions import JUMPING, asks_for_number, conditions, number_rooted
 from ..expressions.graph import Expr, Graph, needed
 
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
@@ -32,7 +32,9 @@ class Branch:
 
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:
     """Return the operations that may jump in expressions, parts first."""
-    return [node for node in conditions(exprs) if node.op in _JUMPS]
+    # What asks whether a root is a number has NaN on its other side, and no run comes there.
+    nodes = conditions(exprs)
+    return [node for node in nodes if node.op in _JUMPS and not asks_for_number(node)]
 
 
 def by_comparisons(graph: Graph, exprs: Sequence[Expr]) -> list[Expr]:

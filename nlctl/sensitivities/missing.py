@@ -27,6 +27,7 @@ from .directions import SomeRows
 from .program import Differentiated
 from .record import NoDerivative
 from .source import EquationParts
+from .steep import without_stills
 
 Arrays = dict[str, np.ndarray]
 
@@ -72,7 +73,8 @@ def evaluated_rows(
 ) -> np.ndarray:
     """Return the rows of some pieces."""
     searches = searches_of(differentiated.compiled.equations)
-    evaluated = evaluate_expressions([e for e, _ in pieces], arrays, searches)
+    exprs = without_stills(differentiated.sides.source.graph, [e for e, _ in pieces])
+    evaluated = evaluate_expressions(exprs, arrays, searches)
     parts = [np.broadcast_to(v.reshape(-1), (n,)) if v.size in (1, n) else v.reshape(-1)
              for v, (_, n) in zip(evaluated, pieces, strict=True)]  # fmt: skip
     return np.concatenate([np.empty(0), *parts])

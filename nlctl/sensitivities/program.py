@@ -25,6 +25,7 @@ from .saltation import Saltation
 from .schedule import Extended, Sent, extended, has_constant_delays, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
+from .steep import without_stills
 
 # How far behind a turn a step ends, of a step: as far as the root of the relative tolerance says,
 # or as the part over which it is seen whether a memory turns.
@@ -310,14 +311,14 @@ class _Maker:
 
     def _rows(self, first: int, pieces: Sequence[SomeRows]) -> list[tuple[int, Tracer]]:
         """Return pieces as arrays with their rows."""
-        rows = []
-        for expr, size in pieces:
+        rows, exprs = [], without_stills(self.source.graph, [e for e, _ in pieces])
+        for expr, (_, size) in zip(exprs, pieces, strict=True):
             rows.append((first, _array(self.source.graph, expr, size)))
             first += size
         return rows
 
     def _flow(self) -> list[tuple[int, Tracer]]:
-        pieces, places = list(self.source.flow), self.places
+        pieces, places = list(self.source.exact_flow), self.places
         for j in range(places.by):
             pieces += self._along(self.source.flow, j)
         rest = places.size - places.kept

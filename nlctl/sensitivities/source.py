@@ -34,6 +34,9 @@ from ..sliding.relay import SLIDING
 from .branches import by_comparisons, jumping
 from .directions import Direction, SomeRows, from_time, one_sided, rows_replaced, slopes, taken
 from .schedule import Extended, Sent
+from .steep import bent_roots, steep_levels, with_their_opposites, without_stills
+
+_SHORT = 1e5  # times what of the times is passed at once: a bend of a steep root is as short
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +123,31 @@ class EquationParts:
 
     @cached_property
     def flow(self) -> list[SomeRows]:
+        """The derivatives of the states, with steep roots bent so that these have derivatives."""
+        graph, way = self.graph, self.time(self.exact_flow, delays_move=False)
+        exprs, short = self._exact, graph.op("mul", graph.const(_SHORT), self.setting("rounding"))
+        steep = steep_levels(graph, exprs, self._levels(jumping(exprs)))
+        rates = self.changes([*steep.values()], way)
+        bent = {**bent_roots(graph, steep, rates, short), **{e: e for e in jumping(exprs)}}
+        if not steep:
+            return self.exact_flow
+        exprs = replaced_parts(graph, exprs, bent)
+        return [(e, size) for e, (_, size) in zip(exprs, self.exact_flow, strict=True)]
+
+    @property
+    def _exact(self) -> list[Expr]:
+        return [e for e, _ in self.exact_flow]
+
+    @cached_property
+    def _turning_roots(self) -> set[Expr]:
+        """What jumps where a steep root is 0, as the sign of what flows out does."""
+        steep = steep_levels(self.graph, self._exact, self._levels(jumping(self._exact)))
+        levels = with_their_opposites(self.graph, steep.values())
+        flow = without_stills(self.graph, [e for e, _ in self.flow], self.graph.const(0.0))
+        return {e for e in jumping(flow) if switching_function(self.graph, e) in levels}
+
+    @cached_property
+    def exact_flow(self) -> list[SomeRows]:
         """The derivatives of the states; memories stand still."""
         still = dict.fromkeys(self.program.memory, self.graph.const(0.0))
         return rows_replaced(self.graph, self.equations.pieces("dx"), still)
@@ -157,12 +185,15 @@ class EquationParts:
         compared = [a for e in jumping(roots) for a in e.args if a.varies]
         roots = [*roots, *compared]
         bending = Bending(self.graph, roots, self.p)
-        return [e for e in jumping(roots) if e in cornered or not bending.only_bends(e)]
+        return [
+            e for e in jumping(roots)
+            if e in cornered or e in self._turning_roots or not bending.only_bends(e)
+        ]  # fmt: skip
 
     @property
     def _flowing(self) -> list[Expr]:
         """What a run is made of between its events."""
-        return [*(e for e, _ in (*self.flow, *self.arriving)), *self.driven.values()]
+        return [*(e for e, _ in (*self.exact_flow, *self.arriving)), *self.driven.values()]
 
     @cached_property
     def of_memories(self) -> list[Expr]:

@@ -400,11 +400,11 @@ def through_a_root(t, x, u, params):
     return [params["a"] + np.sqrt(np.abs(x[0]))]
 
 
-@pytest.mark.parametrize("rtol", [1e-7, 1e-11])
-def test_rates_without_a_bound_end_derivatives_or_have_them(rtol):
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9, 1e-11])
+def test_rates_without_a_bound_have_derivatives(rtol):
     """x' = a + sqrt|x| from -1: t = 2 (r - a log(1 + r / a)) below 0, with r = sqrt|x|, and above.
 
-    The slope of the rate has no bound at 0: with small tolerances no number of steps leads past it.
+    The slope of the rate has no bound at 0.
     """
     plant = ct.nlsys(through_a_root, None, states=1, inputs=0, outputs=1, name="plant",
                      params={"a": 1.0})  # fmt: skip
@@ -426,6 +426,5 @@ def test_rates_without_a_bound_end_derivatives_or_have_them(rtol):
 
     slopes = [(reached(1 + 1e-5, t) - reached(1 - 1e-5, t)) / 2e-5 for t in (0.5, 2.0)]
     assert before == pytest.approx(slopes[0], rel=1e-5)
-    assert np.isnan(after) or after == pytest.approx(slopes[1], rel=1e-4)
-    assert np.isnan(after) == (rtol < 1e-8)
-    assert ("cannot be integrated further" in str(run)) == (rtol < 1e-8)
+    assert after == pytest.approx(slopes[1], rel=3e-6)
+    assert not run.missing
