@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..responses.watched import Watched
 from ..sampling.clock import Instants, instants
 from .diagram.program import Program
 from .histories import lines_of
@@ -19,6 +18,7 @@ from .integrate.samples import Ticks
 from .machine.evaluations import Machine
 from .machine.routine import entries_of
 from .reading import Reading
+from .tied import tied
 
 
 class Laid(NamedTuple):
@@ -43,7 +43,7 @@ def _laid(reading: Reading, code: Machine) -> Laid:
     nothing, signals = [instants({}, 0.0, 0.0)] * width, entries_of((code.out,))
     return Laid(
         code=code,
-        rows=_rows(program, code, reading.schedule.watched),
+        rows=_rows(reading, code),
         resets=_resets(program, code),
         sharp=with_table(
             Sharp,
@@ -56,8 +56,9 @@ def _laid(reading: Reading, code: Machine) -> Laid:
     )
 
 
-def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:
+def _rows(reading: Reading, code: Machine) -> EventRows:
     """Return how many rows are whose: declared, located, memories."""
+    program, watched = reading.program, reading.schedule.watched
     located, conditions = code.lowered.rows["g"], code.lowered.conditions
     partners = [*[0] * program.switching, *conditions.partners, *[0] * len(program.guards)]
     return with_table(
@@ -69,6 +70,7 @@ def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> Even
         watched=located - len(program.guards) - len(watched),
         ways=np.array([each.direction for each in watched], dtype=np.int64),
         ending=np.array([each.ends for each in watched], dtype=np.int64),
+        ties=tied(reading),
         partners=np.array(partners, dtype=np.int64),
         memory=np.array(program.memory, dtype=np.int64),
     )

@@ -43,6 +43,7 @@ from .results import Trajectory
 
 Slides = list[tuple["Slide", float]]  # each with how far its function is from 0 at rest
 
+_DONE = Status.OK, Status.ENDED
 _STEPS = 0.0, 1.0  # instead of sides of what counts: these are of no one integer
 _MOST = 24  # runs again
 _NUMBERS = 256  # elements of an array that slide one by one
@@ -134,9 +135,12 @@ class _Around:
         """The switching functions that are numbers, by their rows: declared ones and others."""
         slides = [node for node in self.compiled.schedule.nodes if node.slide]
         relays = sum(map(count_switching_functions, slides))
-        first = self.compiled.program.switching
-        rows = declared_functions(self.read.results, first - relays)
-        for one in self.read.conditions.located:
+        first, watched = self.compiled.program.switching, len(self.compiled.schedule.watched)
+        rows, located = (
+            declared_functions(self.read.results, first - relays),
+            self.read.conditions.located,
+        )
+        for one in located[: len(located) - watched]:  # but for what a run watches
             if not one.bends and one.function.size is None:
                 rows[first] = one.function
             first += one.rows
@@ -333,7 +337,7 @@ def sliding(
         last = further
         # of relays whose inputs depend on each other no output is known: it ends where that is so
         ahead = last.reached.statistics.time - best.reached.statistics.time
-        if last.reached.statistics.status is Status.OK or ahead > _AHEAD * np.ptp(times):
+        if last.reached.statistics.status in _DONE or ahead > _AHEAD * np.ptp(times):
             best = last
     return best
 

@@ -67,7 +67,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["lower"],
         ["reading"],
         ["machine"],
-        ["enclosures", "floats", "jacobians"],
+        ["enclosures", "floats", "jacobians", "tied"],
         ["derivative_audit", "describe"],
         ["compiled"],
         ["cut_delays", "ensemble_result", "integrate", "members"],

@@ -16,7 +16,7 @@ from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
 from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
-from .events.functions import at_zero, begin_next, has_events
+from .events.functions import at_zero, begin_next, has_events, is_of_relay
 from .events.kinks import crossed_before, look_at_kinks
 from .events.location import (
     AGAIN,
@@ -30,6 +30,7 @@ from .events.location import (
     step_accepted,
 )
 from .events.near_side import look_before
+from .events.rest import counts, ends_at_rest, note_rest
 from .events.sharp import forget, look_at_sharp
 from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
@@ -87,6 +88,8 @@ def _judge(task, lanes, w, found):
         if found[j] == AGAIN:
             lane.rejected += 1
             lane.cross = 0.0
+        elif task.rows.ways.size and ends_at_rest(task, lane, w, j):
+            found[j] = REFUSED
 
 
 @numba.njit(**INNER)
@@ -157,7 +160,7 @@ def _switches(task, w, j):
     """Whether a step ends at an event of a switching function, and not where a memory turns."""
     for i in range(task.rows.guarded):
         before, now = w.events.g_start[i, j], w.events.g[i, j]
-        if opposite(before, now) and not at_zero(task, i, before):
+        if opposite(before, now) and not at_zero(task, w, i, w.events.g_start, j):
             return True
         if left_to_other_side(task, w, i, j):
             return True
@@ -349,9 +352,11 @@ def _note_jumps(task, lanes, w, done):
                 continue
             came = events.behind[i, j] if before == 0.0 else before
             leaves = opposite(came, now) or (came == 0.0 and abs(now) > 0.0 and not ends)
-            if leaves and _counts(task, lanes[j], i, now):
+            if leaves and counts(task, lanes[j], i, now):
                 note(task, lanes[j], w, lanes[j].t, i, now > 0.0, j)
             events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
+            if now == 0.0 and abs(before) > _ROUGH * events.largest[i, j]:
+                events.side[i, j] = 0.0  # that counts where it jumps on
 
 
 @numba.njit(**INNER)
@@ -361,19 +366,6 @@ def _look_at_inputs(task, lanes, w):
         w.t[j] = lanes[j].t
     if lanes[0].status == ENDED and w.u.shape[0]:
         inputs_at(task, lanes, w)
-
-
-@numba.njit(**INNER)
-def _counts(task, lane, i, end):
-    """Whether a change of sign counts; of functions that the run watches one may end it."""
-    k = i - task.rows.watched
-    if k < 0:
-        return True
-    if task.rows.ways[k] != 0 and (task.rows.ways[k] > 0) != (end > 0.0):
-        return False
-    if task.rows.ending[k] and lane.status == RUNNING:
-        lane.status = ENDED
-    return True
 
 
 @numba.njit(**INNER)
@@ -393,9 +385,12 @@ def _note_events(task, lanes, w, found, done):
             before, now = events.g_start[i, j], events.g[i, j]
             if opposite(before, now):
                 turns = 0
-                if at_zero(task, i, before) or at_zero(task, i, now):
+                if at_zero(task, w, i, events.g_start, j) or at_zero(task, w, i, events.g, j):
                     continue  # noted where it has left that
-                if _counts(task, lanes[j], i, now):
+                if is_of_relay(task, i):
+                    continue  # noted where it has settled
+                events.came[i, j] = 2.0 * np.sign(now)  # until it is seen there
+                if counts(task, lanes[j], i, now):
                     note(task, lanes[j], w, lanes[j].t, i, _rises(task, w, i, now, j), j)
             elif left_to_other_side(task, w, i, j):
                 turns = 0
@@ -423,7 +418,10 @@ def _note_left(task, lane, w, located, j):
     events, rows = w.events, task.rows
     for i in range(rows.bending if rows.memory.size else 0, rows.guarded):
         before, now, came = events.g_start[i, j], events.g[i, j], events.came[i, j]
-        if not at_zero(task, i, before) or at_zero(task, i, now) or now != now:
+        if 0 <= i - rows.watched < rows.ways.size and note_rest(task, lane, w, i, j):
+            continue
+        at_start = at_zero(task, w, i, events.g_start, j)
+        if not at_start or at_zero(task, w, i, events.g, j) or now != now:
             continue
         if came == 0.0 and i >= rows.watched and rows.ending[i - rows.watched]:
             continue
@@ -431,7 +429,7 @@ def _note_left(task, lane, w, located, j):
             continue
         if came == 0.0 or opposite(came, now):
             t = lane.t if located and came != 0.0 and before == 0.0 else lane.begun
-            if _counts(task, lane, i, now):
+            if counts(task, lane, i, now):
                 note(task, lane, w, t, i, _rises(task, w, i, now, j), j)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..control import shorten
 from ..state import INNER, is_stiff, opposite
-from .functions import at_zero
+from .functions import at_zero, is_of_relay
 from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
@@ -135,7 +135,7 @@ def _beyond(task, lane, w, j):
     farthest = 0.0
     for i in range(task.rows.declared, task.rows.guarded):
         start = w.events.g_start[i, j]
-        for n in range(3):
+        for n in range(0 if is_of_relay(task, i) else 3):
             if opposite(start, w.events.g_inside[n, i, j]):
                 farthest = max(farthest, -w.events.g_inside[n, i, j] / start)
     return farthest
@@ -153,7 +153,7 @@ def _across(task, lane, w, j):
     for i in range(task.rows.switching):
         end = w.events.g[i, j]
         crossed = has_crossed(task, w, i, end, j) or left_to_other_side(task, w, i, j)
-        if crossed and not at_zero(task, i, end):
+        if crossed and not at_zero(task, w, i, w.events.g, j):
             lane.misses = 0
             return EVENT
     lane.misses += 1
@@ -202,6 +202,9 @@ def left_to_other_side(task, w, i, j):
 @numba.njit(**INNER)
 def has_crossed(task, w, i, end, j):
     """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
+    # What is watched and tied to a relay changes its sign where that switches, and a step ends.
+    if is_of_relay(task, i):
+        return False
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
     return opposite(w.events.g_start[i, j], end)

@@ -22,7 +22,8 @@ from ..methods.dense import events_at_parts
 from ..methods.quartic import doubt, least_value, parabola, quartic, slope_at
 from ..restart import AHEAD
 from ..state import INNER, is_stiff
-from .location import AGAIN, STARTS_BEHIND, goes_over_kinks, is_kink
+from .functions import is_of_relay
+from .location import AGAIN, SHORT, STARTS_BEHIND, goes_over_kinks, is_kink
 
 _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in a step
 _HOPELESS = 0.6  # part of a step in which a smooth function can be followed, after one or two such
@@ -47,7 +48,7 @@ def look_between(rhs, task, lanes, w, found):
         inside.resolved[j] = np.inf
         wanted[j] = (
             found[j] > AGAIN
-            and not lanes[j].across
+            and not (lanes[j].across and lanes[j].step < SHORT * lanes[j].h)
             and lanes[j].step > shortest
             and _suspected(task, lanes[j], w, j)
         )
@@ -95,7 +96,7 @@ def _known(task, lane, w, i, j, row):
     # Of `f`, which is above 0 at both ends of the step: sign times the function plus offset.
     inside, at = w.inside, task.pair.inside[row]
     values = inside.values
-    if is_kink(task, i) and goes_over_kinks(task, lane):
+    if is_of_relay(task, i) or (is_kink(task, i) and goes_over_kinks(task, lane)):
         return _CLEAR, 0.0
     sign, offset = _side(w, i, j)
     values[0] = sign * w.events.g_start[i, j] + offset
