@@ -18,7 +18,7 @@ from .reading import Reading
 
 _NONE = -1
 _POINTS = 256
-_SIZES = 2.0  # decades of the sizes of states, about 1
+_SIZES = -16.0, 2.0  # decades of states and inputs: next to 0 what differs has another sign
 _NEAR = 0.1  # of a parameter
 
 
@@ -81,7 +81,8 @@ def _points(reading: Reading, relays: Mapping[int, Expr]) -> dict[str, np.ndarra
     rng, p = np.random.default_rng(0), reading.parameter_vector()
     states, inputs = reading.system.nstates or 0, reading.schedule.ninputs
     t, x, u, near = (rng.normal(size=(n, _POINTS)) for n in (1, states, inputs, p.size))
-    x *= 10.0 ** rng.uniform(-_SIZES, _SIZES, x.shape)
+    x *= 10.0 ** rng.uniform(*_SIZES, x.shape)
+    u *= 10.0 ** rng.uniform(*_SIZES, u.shape)
     modes = [-2 - place for place in relays]
     x[modes] = 1.0
     arrays = {"t": t, "x": x, "u": u, "p": p[:, None] * (1.0 + _NEAR * near)}

@@ -94,6 +94,21 @@ def test_leaving_rest_counts_for_the_side_that_it_has_come_from(how, rtol):
 
 
 @pytest.mark.parametrize("how", METHODS, ids=lambda how: how["method"])
+@pytest.mark.parametrize("belt", [1e-2, 1e-5])
+def test_what_slides_next_to_0_is_not_there(belt, how):
+    """A mass on a belt comes to rest on it, and so never stops."""
+
+    def carried(t, x, u, p):
+        return [-2.0 * np.sign(x[0] - p["belt"]) + 0.5 * np.sin(3.0 * t)]
+
+    run = nlctl.input_output_response(
+        single(carried, belt=belt), [0, 4], 0, 1.0, stop_when=speed, **how
+    )
+    assert run.time[-1] == 4.0
+    assert run.states[0, -1] == pytest.approx(belt, rel=1e-3)
+
+
+@pytest.mark.parametrize("how", METHODS, ids=lambda how: how["method"])
 def test_exponentials_do_not_come_to_rest(how):
     run = nlctl.input_output_response(
         single(lambda t, x, u, p: [-x[0]]), [0, 20], 0, 1.0, events={"e": speed}, **how
