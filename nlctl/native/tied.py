@@ -20,6 +20,7 @@ _NONE = -1
 _POINTS = 256
 _SIZES = -16.0, 2.0  # decades of states and inputs: next to 0 what differs has another sign
 _NEAR = 0.1  # of a parameter
+_SMALL = 0.01  # of a function: what is never as near to 0 jumps over it
 
 
 def tied(reading: Reading) -> np.ndarray:
@@ -40,12 +41,13 @@ def tied(reading: Reading) -> np.ndarray:
             if one is function:
                 ties[k] = place
     try:
-        signs = _signs([*watched, *places.values()], _points(reading, relays))
+        values = _values([*watched, *places.values()], _points(reading, relays))
     except Untraceable:  # there is what is called unchanged
         return ties
-    for place, sign in zip(places, signs[count:], strict=True):
+    for place, other in zip(places, values[count:], strict=True):
         for k in np.flatnonzero(ties == _NONE):
-            if _have_equal_zeros(signs[k], sign):
+            jumps = np.abs(values[k]).min() > _SMALL * np.abs(values[k]).max()
+            if _have_equal_zeros(np.sign(values[k]), np.sign(other)) and (place < 0 or not jumps):
                 ties[k] = place
     return ties
 
@@ -71,9 +73,9 @@ def _relays(reading: Reading, read: Equations) -> dict[int, Expr]:
     return relays
 
 
-def _signs(exprs: Sequence[Expr], arrays: dict[str, np.ndarray]) -> np.ndarray:
+def _values(exprs: Sequence[Expr], arrays: dict[str, np.ndarray]) -> np.ndarray:
     values = evaluate_expressions(exprs, arrays)
-    return np.array([np.broadcast_to(np.sign(value), (_POINTS,)) for value in values])
+    return np.array([np.broadcast_to(value, (_POINTS,)) for value in values])
 
 
 def _points(reading: Reading, relays: Mapping[int, Expr]) -> dict[str, np.ndarray]:
@@ -86,7 +88,7 @@ def _points(reading: Reading, relays: Mapping[int, Expr]) -> dict[str, np.ndarra
     modes = [-2 - place for place in relays]
     x[modes] = 1.0
     arrays = {"t": t, "x": x, "u": u, "p": p[:, None] * (1.0 + _NEAR * near)}
-    x[modes] = _signs([*relays.values()], arrays).reshape(len(modes), _POINTS)
+    x[modes] = np.sign(_values([*relays.values()], arrays)).reshape(len(modes), _POINTS)
     return arrays
 
 

@@ -109,6 +109,21 @@ def test_what_slides_next_to_0_is_not_there(belt, how):
 
 
 @pytest.mark.parametrize("how", METHODS, ids=lambda how: how["method"])
+def test_what_jumps_over_0_by_a_comparison_is_seen_both_ways(how):
+    def either(t, x, u, p):
+        return 1.0 if x[0] - 0.5 * np.sin(4.0 * t) > -0.2 else -1.0
+
+    run = nlctl.input_output_response(
+        single(lambda t, x, u, p: [-x[0]]), [0, 8], 0, 1.0, events={"e": either}, **how
+    )
+    t = np.linspace(0, 8, 800_001)
+    signs = np.sign(np.exp(-t) - 0.5 * np.sin(4.0 * t) + 0.2)
+    changes = t[1:][np.diff(signs) != 0]
+    rows = run.events[run.events["which"] == "e"]
+    assert rows["time"].to_numpy() == pytest.approx(changes, abs=1e-4)
+
+
+@pytest.mark.parametrize("how", METHODS, ids=lambda how: how["method"])
 def test_exponentials_do_not_come_to_rest(how):
     run = nlctl.input_output_response(
         single(lambda t, x, u, p: [-x[0]]), [0, 20], 0, 1.0, events={"e": speed}, **how
