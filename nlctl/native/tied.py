@@ -53,10 +53,10 @@ def tied(reading: Reading) -> np.ndarray:
 
 
 def _kinks(reading: Reading, read: Equations) -> dict[int, Expr]:
-    """Return the functions of conditions at which nothing jumps, by their rows."""
+    """Return the functions of the blocks' conditions at which nothing jumps, by their rows."""
     kinks, row = {}, reading.program.switching
     for one in read.conditions.located:
-        if one.bends and one.function.size is None:
+        if one.bends and one.block and one.function.size is None:
             kinks[row] = one.function
         row += one.rows
     return kinks
